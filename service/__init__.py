@@ -1,0 +1,5 @@
+"""
+service shows and accepts: the command line, and the server's routes and reports. No pixels, no SQL.
+
+It knows ``jobs`` and the Mitsuba-free modules of ``renderer`` (``spec``, ``catalog``, ``errors``, ``llvm``, ``devices``).
+"""
