@@ -1,0 +1,172 @@
+"""
+Where a scene comes from, and its snapshot.
+
+``find`` turns the name a user typed into a ``SceneSource``: the main XML file and every file that it refers to, vetted,
+and one digest over their contents. ``snapshot`` copies exactly these files into a folder named by the digest; cells
+render that copy, so a scene that is edited later is another scene and never a wrong picture. What else lies in the
+folder (a README, old renderings) is no part of the scene.
+
+What may be in a scene is the business of ``vet``; loading it, of ``load``. No Mitsuba here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from renderer.errors import SceneError, UnknownName
+from renderer.scenes.builtin import BUILTIN
+from renderer.scenes.defaults import SceneDefaults, defaults_of
+from renderer.scenes.vet import SceneFile, examine
+
+__all__ = ["SceneDefaults", "SceneFile", "SceneSource", "find", "snapshot"]
+
+MAIN = "scene.xml"  # the main file of a folder that holds several
+ABANDONED_S = 3600  # a half-made copy that is older belongs to a process that was killed
+
+
+@dataclass(frozen=True)
+class SceneSource:
+    """
+    A scene that was found and vetted.
+
+    name      as the user typed it, or the built-in's
+    folder    where its files are now
+    main      the XML file to load, relative to ``folder``
+    files     the main file and all that it refers to, sorted by path
+    digest    SHA-256 of main and files: the same on every machine, whatever else the folder holds
+    builtin   True: shipped with Dartboard
+    defaults  what the file itself says about size, integrator and sampler
+    """
+
+    name: str
+    folder: Path
+    main: str
+    files: tuple[SceneFile, ...]
+    digest: str
+    builtin: bool
+    defaults: SceneDefaults
+
+
+def find(name: str, base: Path) -> SceneSource:
+    """
+    The scene that ``name`` means: a built-in, or a path relative to ``base`` of a Mitsuba XML file or of a folder
+    that holds ``scene.xml`` or just one XML file. Raises ``UnknownName`` or ``SceneError``.
+    """
+    if name in BUILTIN:
+        return _read(name, BUILTIN[name].folder, MAIN, builtin=True)
+    path = base / name
+    try:
+        is_folder, is_file = path.is_dir(), path.is_file()
+    except (OSError, ValueError):  # a name that no file system takes
+        is_folder = is_file = False
+    if is_folder:
+        return _read(name, path, _main_of(path, name), builtin=False)
+    if is_file and path.suffix.lower() == ".xml":
+        return _read(name, path.parent, path.name, builtin=False)
+    if is_file:
+        raise SceneError(f"scene {name!r} is not an .xml file; name a Mitsuba XML file or a folder that holds one")
+    if "/" not in name and "." not in name:
+        raise UnknownName("scene", name, "", BUILTIN)
+    raise SceneError(f"scene {name!r} does not exist in {base}; a scene is a path from there, or one of {_builtins()}")
+
+
+def snapshot(source: SceneSource, into: Path) -> Path:
+    """
+    Copies the scene to ``into/<digest>/`` and returns that folder; does nothing where it is already there.
+
+    Written beside, flushed, then renamed: the folder is complete or absent, also when several processes copy at once
+    or one is killed. Raises ``SceneError`` when a file is no longer the one that was vetted.
+    """
+    target = into / source.digest
+    if target.is_dir():
+        return target
+    into.mkdir(parents=True, exist_ok=True)
+    _sweep(into)
+    work = Path(tempfile.mkdtemp(prefix=".scene-", dir=into))
+    try:
+        for file in source.files:
+            _copy(source, file, work)
+        for folder in [*{(work / file.path).parent for file in source.files}, work]:
+            _flush(folder)
+        work.chmod(0o755)  # mkdtemp's 0700 would hide it from a render process of another user
+        try:
+            work.rename(target)
+        except OSError:
+            if not target.is_dir():  # else another process was first; its copy is the same by digest
+                raise
+        _flush(into)
+        return target
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def digest_of(main: str, files: Iterable[SceneFile]) -> str:
+    """The identity of a scene: SHA-256 of a canonical list of its main file and the content of every file."""
+    listing = [main, sorted((file.path, file.sha256) for file in files)]
+    return hashlib.sha256(json.dumps(listing, separators=(",", ":")).encode("ascii")).hexdigest()
+
+
+def _read(name: str, folder: Path, main: str, builtin: bool) -> SceneSource:
+    found = examine(folder, main)
+    if found.reasons or found.root is None:
+        raise SceneError(f"scene {name!r} is refused: " + "; ".join(found.reasons))
+    files = tuple(sorted(found.files.values(), key=lambda file: file.path))
+    return SceneSource(name, folder, main, files, digest_of(main, files), builtin, defaults_of(found.root))
+
+
+def _main_of(folder: Path, name: str) -> str:
+    if (folder / MAIN).is_file():
+        return MAIN
+    found = sorted(path.name for path in folder.glob("*.xml"))
+    if len(found) == 1:
+        return found[0]
+    held = f"the {len(found)} files {', '.join(found[:5])}" if found else "no .xml file"
+    raise SceneError(f"the folder {name!r} holds {held}; name the file, or call the main one {MAIN}")
+
+
+def _builtins() -> str:
+    return ", ".join(sorted(BUILTIN))
+
+
+def _copy(source: SceneSource, file: SceneFile, work: Path) -> None:
+    to = work / file.path
+    to.parent.mkdir(parents=True, exist_ok=True)
+    digest = hashlib.sha256()
+    try:
+        with (source.folder / file.path).open("rb") as read, to.open("xb") as write:
+            while block := read.read(2**20):
+                digest.update(block)
+                write.write(block)
+            write.flush()
+            os.fsync(write.fileno())
+    except FileNotFoundError:
+        raise SceneError(f"scene {source.name!r}: {file.path} was removed while it was copied; submit again") from None
+    if digest.hexdigest() != file.sha256:
+        raise SceneError(f"scene {source.name!r}: {file.path} was changed while it was copied; submit again")
+    to.chmod(0o444)  # a snapshot is never edited: its name is its content
+
+
+def _flush(folder: Path) -> None:
+    """Makes the entries of a folder durable."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _sweep(into: Path) -> None:
+    for left in into.glob(".scene-*"):
+        try:
+            if time.time() - left.stat().st_mtime > ABANDONED_S:
+                shutil.rmtree(left, ignore_errors=True)
+        except OSError:
+            continue  # another process swept it
