@@ -14,10 +14,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from renderer.errors import BadParameter, DartboardError, UnknownName
+from renderer.errors import BadParameter, DartboardError, UnknownName, shown
 from renderer.spec import Choice, Scalar
 
 MAX_SPP = 10**7  # more is refused: a typo, not an experiment
+MAX_DEPTH = 10**6  # edges; fits Mitsuba's 32-bit integers, and no light survives as many
 COLOURS = ("rgb", "spectral")
 
 
@@ -26,6 +27,7 @@ class Parameter:
     """
     One parameter of a plugin. ``default`` None means: taken from the grid or the scene, not from here.
 
+    banned    values inside the range that make no experiment
     estimand  True if the parameter changes the expected picture; it then belongs to the cell's estimand
     """
 
@@ -36,6 +38,7 @@ class Parameter:
     unit: str = ""
     minimum: float | None = None
     maximum: float | None = None
+    banned: tuple[Scalar, ...] = ()
     estimand: bool = False
 
     def read(self, value: object, where: str) -> Scalar:
@@ -48,14 +51,14 @@ class Parameter:
         elif self.kind is int and not isinstance(value, bool):
             read = int(value) if isinstance(value, (int, float)) and value == value // 1 else None
         elif self.kind is float and not isinstance(value, bool):
-            read = float(value) if isinstance(value, (int, float)) and math.isfinite(value) else None
+            read = _finite(value) if isinstance(value, (int, float)) else None
         elif self.kind is str and isinstance(value, str):
             read = value
         number = isinstance(read, (int, float)) and not isinstance(read, bool)
         low = number and self.minimum is not None and read < self.minimum  # type: ignore[operator]
         high = number and self.maximum is not None and read > self.maximum  # type: ignore[operator]
-        if read is None or low or high:
-            raise BadParameter(f"{self.name} = {value!r} of {where} is not allowed; it is {self.allowed}")
+        if read is None or low or high or read in self.banned:
+            raise BadParameter(f"{self.name} = {shown(value)} of {where} is not allowed; it is {self.allowed}")
         return read
 
     @property
@@ -63,10 +66,10 @@ class Parameter:
         """The range in words: ``an integer from 1 to 64``."""
         words = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}[self.kind]
         if self.minimum is not None:
-            words += f" from {self.minimum:g}" if self.maximum is not None else f" of at least {self.minimum:g}"
+            words += f" {'of at least' if self.maximum is None else 'from'} {_to_text(self.minimum)}"
         if self.maximum is not None:
-            words += f" to {self.maximum:g}"
-        return words
+            words += f" to {_to_text(self.maximum)}"
+        return words + "".join(f", not {value}" for value in self.banned)
 
 
 @dataclass(frozen=True)
@@ -121,7 +124,8 @@ def _power_of_four(spp: int) -> int:
 
 
 _JITTER = Parameter("jitter", bool, True, "random position in a stratum; false takes its centre, which is biased")
-_DEPTH = Parameter("max_depth", int, None, "edges of the longest path; -1 is unlimited", "edges", -1, estimand=True)
+_DEPTH = Parameter("max_depth", int, None, "edges of the longest path; -1 is unlimited", "edges", -1, MAX_DEPTH,
+                   banned=(0,), estimand=True)  # fmt: skip
 _HIDE = Parameter("hide_emitters", bool, False, "lamps are not seen directly", estimand=True)
 _MITSUBA = "Mitsuba 3.9"
 
@@ -137,7 +141,8 @@ _ENTRIES = (
     Entry("sampler", "ldsampler", "one (0,2)-net per pixel, permuted per dimension (Kollig and Keller 2002)", _MITSUBA,
           "ldsampler", rounds=_power_of_four, rounding="up to a power of four"),
     Entry("integrator", "path", "path tracing with next-event estimation and multiple importance sampling", _MITSUBA,
-          "path", parameters=(_DEPTH, _HIDE, Parameter("rr_depth", int, 5, "edges before Russian roulette", "edges", 1))),
+          "path", parameters=(_DEPTH, _HIDE,
+                              Parameter("rr_depth", int, 5, "edges before Russian roulette", "edges", 1, MAX_DEPTH))),
     Entry("integrator", "direct", "direct light only: paths of at most two edges", _MITSUBA, "direct", depth=2,
           parameters=(_HIDE, Parameter("emitter_samples", int, 1, "light samples per camera ray", "", 1, 1024),
                       Parameter("bsdf_samples", int, 1, "BSDF samples per camera ray", "", 1, 1024))),
@@ -203,19 +208,20 @@ def label(axis: str, choice: Choice) -> str:
 def rendered_spp(sampler: Choice, asked: int, where: str = "spp") -> int:
     """What the sampler makes of a request, by its rounding rule. Raises ``BadParameter`` outside 1 … MAX_SPP."""
     if isinstance(asked, bool) or not isinstance(asked, int) or not 1 <= asked <= MAX_SPP:
-        raise BadParameter(f"{where}: {asked!r} samples per pixel are not allowed; give an integer from 1 to {MAX_SPP}")
+        raise BadParameter(f"{where}: {shown(asked)} samples per pixel; give an integer from 1 to {MAX_SPP}")
     rendered = find("sampler", sampler.name).rounds(asked)
     if rendered > MAX_SPP:
         raise BadParameter(
-            f"{where}: {sampler.name} rounds {asked} samples per pixel up to {rendered}, more than {MAX_SPP}; ask for less"
+            f"{where}: {sampler.name} rounds {asked} samples per pixel up to {rendered}, more than {MAX_SPP}; "
+            "ask for less"
         )
     return rendered
 
 
 def as_json() -> dict[str, list[dict[str, Any]]]:
-    """The catalog as plain values for ``catalog --json``, the REST interface and the docs."""
-    from renderer.scenes.builtin import BUILTIN
+    """The catalog, with scenes and metrics, as plain values for ``catalog --json``, the REST interface and the docs."""
     from renderer.metrics import METRICS
+    from renderer.scenes.builtin import BUILTIN
 
     def parameter(item: Parameter) -> dict[str, Any]:
         return {
@@ -232,6 +238,31 @@ def as_json() -> dict[str, list[dict[str, Any]]]:
         if entry.axis == "sampler":
             row["rounding"] = entry.rounding
         out.setdefault(entry.axis + "s", []).append(row)
+    out["scenes"] = [
+        {
+            "name": scene.name,
+            "line": scene.summary,
+            "source": scene.source,
+            "title": scene.title,
+            "good_for": scene.good_for,
+            "hard_part": scene.hard_part,
+            "bad_for": scene.bad_for,
+            "lamp_in_frame": scene.lamp_in_frame,
+        }
+        for scene in BUILTIN.values()
+    ]
+    out["metrics"] = [
+        {
+            "name": metric.name,
+            "line": metric.line,
+            "formula": metric.formula,
+            "epsilon": metric.epsilon,
+            "version": metric.version,
+            "lower_is_better": metric.lower_is_better,
+            "needs_halves": metric.needs_halves,
+        }
+        for metric in METRICS.values()
+    ]
     return out
 
 
@@ -243,11 +274,19 @@ def _split(axis: str, value: object, where: str) -> tuple[str, dict[str, Any]]:
         pairs = [part.partition("=") for part in rest.split(",")] if rest else []
         for key, sign, _ in pairs:
             if not key or not sign:
-                raise DartboardError(f"cannot read {value!r} in {place}; write NAME or NAME:key=value,key=value")
+                raise DartboardError(f"cannot read {shown(value)} in {place}; write NAME or NAME:key=value,key=value")
         return name.strip(), {key.strip(): text.strip() for key, _, text in pairs}
     if isinstance(value, Mapping) and isinstance(value.get("type"), str):
         return value["type"], {str(key): item for key, item in value.items() if key != "type"}
-    raise DartboardError(f"cannot read {value!r} in {place}; write a name or a table with a type, {{ type = \"NAME\" }}")
+    raise DartboardError(f"cannot read {shown(value)} in {place}; write NAME or a table {{ type = NAME, key = value }}")
+
+
+def _finite(value: float) -> float | None:
+    """``value`` as a float, None where it is not finite or too large for one."""
+    try:
+        return float(value) if math.isfinite(value) else None
+    except OverflowError:
+        return None
 
 
 def _from_text(text: str) -> Scalar:

@@ -9,7 +9,23 @@ catches one class and prints it, and anything else that escapes is a bug of ours
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+import reprlib
+from collections.abc import Iterable, Mapping
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 60  # characters of a value that a sentence repeats
+
+
+def shown(value: object) -> str:
+    """A value as a sentence repeats it: short, TOML's ``true`` and ``false``, never a failure of its own."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, Mapping):
+        return "a table"
+    try:
+        return _SHORT.repr(value)
+    except (ValueError, RecursionError):  # Python prints no integer of more than 4300 digits
+        return f"a very long {type(value).__name__}"
 
 
 class DartboardError(Exception):
@@ -23,10 +39,10 @@ class UnknownName(DartboardError):
 
     def __init__(self, what: str, value: object, where: str, known: Iterable[str]):
         names = sorted(known)
-        close = difflib.get_close_matches(str(value), names, n=1)
+        close = difflib.get_close_matches(value[:80], names, n=1) if isinstance(value, str) else []
         hint = f"; did you mean {close[0]!r}?" if close else ""
         place = f" in {where}" if where else ""
-        super().__init__(f"unknown {what} {value!r}{place}; known: {', '.join(names) or 'none'}{hint}")
+        super().__init__(f"unknown {what} {shown(value)}{place}; known: {', '.join(names) or 'none'}{hint}")
 
 
 class BadParameter(DartboardError):

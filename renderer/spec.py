@@ -151,7 +151,7 @@ class CellSpec:
     sampler: Choice
     spp: int
 
-    @cached_property
+    @property
     def text(self) -> str:
         """Canonical JSON, put together from the cached parts: grids of 10⁵ cells share most of them."""
         return (

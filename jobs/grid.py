@@ -1,0 +1,178 @@
+"""
+Reading a grid: TOML or JSON in, a ``GridSpec`` without open questions out.
+
+Every name is resolved by the catalog, every scene is found and vetted, every limit is checked, and all problems are
+told together (``GridError``). Which cells follow is the business of ``plan.py``. No Mitsuba is imported.
+
+A grid has these keys; all but ``scenes`` may be left out. Where a list is expected one value may stand alone.
+
+    name         how people call the experiment (default: the name of the file)
+    scenes       names of built-in scenes, and paths relative to the grid's own folder
+    samplers     NAME, NAME:key=value or { type = NAME, key = value } (default: independent)
+    integrators  the same (default: path)
+    spp          samples per pixel, 1 to 10⁷ (default: 16, 64, 256); every sampler rounds by its own rule
+    replicates   pictures of each cell with different seeds, 1 to 1000 (default: 4, enough to see a spread)
+    resolution   [width, height] in pixels (default: the scene's)
+    crop         [x, y, width, height] in pixels (default: the whole film)
+    max_depth    edges of the longest path, -1 is unlimited (default: the scene's)
+    rfilter      reconstruction filter (default: box, which keeps pixels independent)
+    colour       "rgb" or "spectral" (default: rgb)
+    reference    what to measure against: { integrator, sampler, spp, replicates }, or false for no reference
+                 (default: path, independent, 4096 spp in total, 2 replicates)
+    scene        tables [scene.NAME]: resolution, crop, max_depth, reference where one scene differs
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from jobs.errors import GridError
+from jobs.fields import Problems, Table, choice
+from jobs.gridscenes import scenes_of
+from jobs.gridspec import MAX_CELLS, MAX_REPLICATES, GridSpec, ReferenceRequest, SceneRequest
+from renderer import catalog
+from renderer.errors import UnknownName, shown
+from renderer.spec import Choice
+
+__all__ = ["GridSpec", "ReferenceRequest", "SceneRequest", "parse", "read"]
+
+MAX_NAME = 200  # characters
+MAX_BYTES = 2**24  # of a grid file
+
+GRID_KEYS = (
+    "name", "scenes", "samplers", "integrators", "spp", "replicates", "resolution", "crop", "max_depth", "rfilter",
+    "colour", "reference", "scene",
+)  # fmt: skip
+EXAMPLE = "examples/first.toml shows a whole grid"
+
+
+def read(path: Path) -> GridSpec:
+    """The grid in a TOML file. Raises ``GridError`` with every problem found."""
+    try:
+        if path.is_dir():
+            raise GridError([f"{path} is a folder; give the grid file itself, such as {path / 'grid.toml'}"])
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise GridError([f"there is no grid file {path}; check its name, or start from examples/first.toml"]) from None
+    except (OSError, ValueError) as error:  # ValueError: a name that no file system takes
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise GridError([f"cannot read the grid {shown(str(path))}: {reason}; check its name and rights"]) from None
+    if len(content) > MAX_BYTES:
+        raise GridError([f"{path} has more than {MAX_BYTES >> 20} MiB, too much for a grid; {EXAMPLE}"])
+    try:
+        text = content.decode("utf-8-sig")  # editors on Windows put a byte order mark first
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        raise GridError([f"{path} is not UTF-8 text (line {line}); save it as UTF-8"]) from None
+    if not text.strip():
+        raise GridError([f'{path} is empty; a grid needs at least scenes = ["cornell_box"]; {EXAMPLE}'])
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise GridError([f"{path} is not a grid: its lists are nested too deeply; {EXAMPLE}"]) from None
+    except ValueError as error:  # TOMLDecodeError says "Reason (at line 3, column 5)"
+        reason, _, place = str(error).removesuffix(")").partition(" (at ")
+        where = f" at {place}" if place else ""
+        raise GridError([f"{path} is not TOML{where}: {reason}; correct it there; {EXAMPLE}"]) from None
+    return parse(data, base=path.parent, origin=path.name)
+
+
+def parse(data: Mapping[str, Any], *, base: Path, origin: str) -> GridSpec:
+    """
+    The grid in parsed TOML or JSON. ``base`` is the folder that scene paths are relative to, ``origin`` is what
+    sentences call the request ("grid.toml"). Raises ``GridError`` with every problem found.
+    """
+    problems = Problems()
+    if not isinstance(data, Mapping):
+        raise GridError([f"{origin} is {shown(data)}; a grid is a table with at least scenes; {EXAMPLE}"])
+    if "sweep" in data:
+        problems.add(f"sweep of {origin}: material sweeps come in a later version; write one scene file per material")
+        data = {key: value for key, value in data.items() if key != "sweep"}
+    grid = Table(data, origin, GRID_KEYS, problems)
+    samplers = _choices(grid, "samplers", "sampler", "independent")
+    integrators = _choices(grid, "integrators", "integrator", "path")
+    rfilter = choice(grid, "rfilter", grid.data.get("rfilter", "box"), grid.place("rfilter"))
+    spp = _spp(grid, samplers)
+    name, colour, replicates = _name(grid), _colour(grid), grid.integer("replicates", 1, MAX_REPLICATES)
+    names = _scene_names(grid)
+    _check_count(grid, {"scenes": names, "integrators": integrators, "samplers": samplers, "spp": spp})
+    scenes = scenes_of(grid, names, integrators, base)
+    problems.raise_any()
+    assert name and rfilter and colour, "what could not be read is a problem"
+    return GridSpec(
+        name, tuple(scenes), tuple(samplers), tuple(integrators), tuple(spp), replicates or 4, rfilter, colour
+    )
+
+
+def _scene_names(grid: Table) -> dict[str, str]:
+    """Each scene as written, once, with its place."""
+    if "scenes" not in grid:
+        grid.problems.add(f'scenes is missing in {grid.where}; name at least one, scenes = ["cornell_box"]; {EXAMPLE}')
+        return {}
+    names: dict[str, str] = {}
+    for value, place in grid.values("scenes", None, MAX_CELLS):
+        if isinstance(value, str) and value:
+            names.setdefault(value, place)
+        else:
+            grid.wrong(place, value, "give the name of a built-in scene, or a path, as a text")
+    return names
+
+
+def _choices(grid: Table, key: str, axis: str, default: str) -> list[Choice]:
+    """The values of an axis, each once, in the order they are written."""
+    read = [choice(grid, axis, value, place) for value, place in grid.values(key, default, MAX_CELLS)]
+    return list({item.text: item for item in read if item}.values())
+
+
+def _spp(grid: Table, samplers: Iterable[Choice]) -> list[int]:
+    """The spp asked for, ascending, each once."""
+    values = grid.values("spp", [16, 64, 256], MAX_CELLS)
+    read = [grid.to_integer(value, place, 1, catalog.MAX_SPP) for value, place in values]
+    spp = sorted({value for value in read if value is not None})
+    for sampler in samplers if spp else ():  # rounding never reverses an order, so the largest tells
+        grid.problems.attempt(partial(catalog.rendered_spp, sampler, spp[-1], grid.place("spp")))
+    return spp
+
+
+def _name(grid: Table) -> str | None:
+    """A name that can be printed on one line and cannot be taken for an experiment's id."""
+    value = grid.data.get("name", Path(grid.where).stem)
+    if not isinstance(value, str) or not value.strip():
+        grid.wrong(grid.place("name"), value, 'give a text, name = "what is compared"')
+    elif len(value) > MAX_NAME or not value.isprintable():
+        grid.wrong(grid.place("name"), value, f"give one line of at most {MAX_NAME} printable characters")
+    elif value.strip().isdecimal():
+        grid.wrong(grid.place("name"), value, 'a number would be taken for an id: add a word, name = "run 3"')
+    else:
+        return value.strip()
+    return None
+
+
+def _colour(grid: Table) -> str | None:
+    value = grid.data.get("colour", "rgb")
+    if isinstance(value, str) and value in catalog.COLOURS:
+        return value
+    if isinstance(value, str) and "polar" in value:
+        grid.wrong(grid.place("colour"), value, "polarized rendering is not supported: use rgb or spectral")
+    else:
+        grid.problems.add(str(UnknownName("colour", value, grid.where, catalog.COLOURS)))
+    return None
+
+
+def _check_count(grid: Table, axes: Mapping[str, Sequence[object] | Mapping[str, str]]) -> None:
+    """Refuses a grid that is too large before any scene is read or cell made."""
+    cells = 1
+    for values in axes.values():
+        cells *= len(values)
+    if cells > MAX_CELLS:
+        product = " × ".join(f"{len(values)} {axis}" for axis, values in axes.items())
+        grid.problems.add(
+            f"{grid.where} asks for {cells} cells ({product}), more than {MAX_CELLS}; leave out values, or split "
+            "it into several grids: what they share is rendered once"
+        )
+        grid.problems.raise_any()

@@ -1,0 +1,216 @@
+"""
+What holds for each scene of a grid: resolution, crop, max_depth and reference.
+
+They may be said for the whole grid, again in ``[scene.NAME]`` for one scene, and the scene file has its own: the
+nearest one counts, for a reference field by field. The checks that need a scene are here too. No Mitsuba.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from jobs.fields import Problems, Table, choice
+from jobs.gridspec import MAX_PIXELS, MAX_REPLICATES, MAX_SIDE, Crop, ReferenceRequest, SceneRequest, path_lengths
+from renderer import catalog
+from renderer.errors import DartboardError, UnknownName, shown
+from renderer.scenes import sources
+from renderer.spec import Choice
+
+SCENE_KEYS = ("resolution", "crop", "max_depth", "reference")
+REFERENCE_KEYS = ("integrator", "sampler", "spp", "replicates")
+
+
+def scenes_of(grid: Table, names: Mapping[str, str], integrators: Sequence[Choice], base: Path) -> list[SceneRequest]:
+    """
+    The scenes of a grid with their settings. ``names`` gives each scene as written and its place in sentences.
+
+    What is wrong is noted in the grid's problems; a scene that cannot be found is left out.
+    """
+    common = _Settings.of(grid, f"[reference] of {grid.where}")
+    own = _own_settings(grid, names)
+    scenes = [_scene(name, place, base, own.get(name), common) for name, place in names.items()]
+    found = [scene for scene in scenes if scene]
+    _check_references(grid, found, integrators)
+    _check_twins(grid, found)
+    return found
+
+
+@dataclass(frozen=True)
+class _Settings:
+    """
+    What may be said for the whole grid and again for one scene; None where it is not said (or wrong, and noted).
+
+    reference  False: none wanted; else what is said about it, by the names of ``ReferenceRequest``
+    """
+
+    table: Table
+    resolution: tuple[int, ...] | None
+    crop: tuple[int, ...] | None
+    max_depth: int | None
+    reference: Mapping[str, Any] | bool | None
+
+    @classmethod
+    def of(cls, table: Table, reference_place: str) -> _Settings:
+        """The settings in ``table``; ``reference_place`` is how sentences call its table ``reference``."""
+        depth = table.integer("max_depth", -1, catalog.MAX_DEPTH)
+        if depth == 0:
+            table.wrong(table.place("max_depth"), 0, "no path has 0 edges: give 1 or more, or -1 for unlimited")
+        return cls(
+            table,
+            table.integers("resolution", "width, height", 1, MAX_SIDE),
+            table.integers("crop", "x, y, width, height", 0, MAX_SIDE),
+            depth,
+            _reference_fields(table, reference_place),
+        )
+
+    def failed(self, key: str) -> bool:
+        return key in self.table and getattr(self, key) is None
+
+
+def _own_settings(grid: Table, names: Iterable[str]) -> dict[str, _Settings]:
+    """The [scene.NAME] tables by the scene's full name."""
+    found: dict[str, _Settings] = {}
+    for key, value in grid.table("scene", "write tables [scene.NAME]").items():
+        where = f"[scene.{key}] of {grid.where}"
+        matches = [key] if key in names else [name for name in names if Path(name).stem == key]
+        if not isinstance(value, Mapping):
+            grid.wrong(where, value, f"write a table with some of {', '.join(SCENE_KEYS)}")
+            continue
+        own = _Settings.of(Table(value, where, SCENE_KEYS, grid.problems), f"[scene.{key}.reference] of {grid.where}")
+        if not matches:
+            grid.problems.add(str(UnknownName("scene", key, where, names)))
+        elif len(matches) > 1:
+            grid.problems.add(f"{where} means {' and '.join(matches)}; quote the whole path, as in scenes")
+        elif matches[0] in found:
+            grid.problems.add(f"{where} is the second table for {matches[0]}; put both into one")
+        else:
+            found[matches[0]] = own
+    return found
+
+
+def _scene(name: str, place: str, base: Path, own: _Settings | None, common: _Settings) -> SceneRequest | None:
+    """One scene with its settings, None where it cannot be found."""
+    problems = common.table.problems
+    try:
+        source = sources.find(name, base)
+    except DartboardError as error:
+        problems.add(f"{place}: {error}")
+        return None
+    levels = [own, common] if own else [common]  # the nearer one counts
+    default = source.defaults
+
+    def nearest(key: str) -> tuple[Any, str]:
+        """The setting and its place in sentences."""
+        for level in levels:
+            if getattr(level, key) is not None:
+                return getattr(level, key), level.table.place(key)
+        return None, place
+
+    size, where = nearest("resolution")
+    width, height = size or (default.width, default.height)
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        problems.add(f"{where}: the file asks for {width}×{height} pixels; set resolution, 1 to {MAX_SIDE} per side")
+    crop, crop_place = nearest("crop")
+    if crop and not any(level.failed("resolution") for level in levels):
+        crop = _check_crop(problems, crop, crop_place, width, height, name)
+    pixels = crop[2] * crop[3] if crop else width * height
+    if pixels > MAX_PIXELS:
+        problems.add(f"{where}: {name} has {pixels} pixels, more than {MAX_PIXELS}; lower resolution, or set crop")
+    depth, where = nearest("max_depth")
+    if depth is None:
+        depth = default.max_depth
+        if not -1 <= depth <= catalog.MAX_DEPTH or depth == 0:
+            problems.add(f"{where}: the file asks for max_depth {depth}; set max_depth: 1 or more, or -1 for unlimited")
+    return SceneRequest(source, width, height, crop, depth, _reference(common, own))
+
+
+def _check_crop(problems: Problems, crop: Crop, place: str, width: int, height: int, scene: str) -> Crop | None:
+    """The crop, None where it is the whole film, so that both spellings are one estimand."""
+    x, y, wide, high = crop
+    if wide < 1 or high < 1 or x + wide > width or y + high > height:
+        problems.add(
+            f"{place} is {list(crop)}, outside the {width}×{height} film of {scene}; "
+            "give [x, y, width, height] inside it, in pixels from the top left"
+        )
+    return None if crop == (0, 0, width, height) else crop
+
+
+def _reference_fields(table: Table, place: str) -> Mapping[str, Any] | bool | None:
+    """What one level says about the reference."""
+    value = table.data.get("reference")
+    if value is None or value is False:
+        return value
+    if value is True:
+        return {}
+    if not isinstance(value, Mapping):
+        table.wrong(table.place("reference"), value, "give a table with integrator, sampler, spp, replicates, or false")
+        return None
+    fields = Table(value, place, REFERENCE_KEYS, table.problems)
+    read: dict[str, Any] = {
+        "asked_total": fields.integer("spp", 1, catalog.MAX_SPP),
+        "replicates": fields.integer("replicates", 2, MAX_REPLICATES, even=True),
+    }
+    for axis in ("integrator", "sampler"):
+        if axis in fields:
+            read[axis] = choice(fields, axis, fields.data[axis], fields.place(axis))
+    if read.get("integrator"):
+        _check_follows(fields, read["integrator"])
+    return {key: item for key, item in read.items() if item is not None}
+
+
+def _check_follows(fields: Table, integrator: Choice) -> None:
+    """What is part of the estimand comes from the cells, so a reference cannot set it."""
+    given = dict(integrator.parameters)
+    for parameter in catalog.find("integrator", integrator.name).parameters:
+        if parameter.estimand and given.get(parameter.name) != parameter.default:
+            follows = "a reference follows the cells that it is compared with; leave it out"
+            fields.wrong(f"{parameter.name} in {fields.place('integrator')}", given[parameter.name], follows)
+
+
+def _reference(common: _Settings, own: _Settings | None) -> ReferenceRequest | None:
+    """The reference of one scene: what the scene says, field by field, else the grid, else the defaults."""
+    said = [level.reference for level in (common, own) if level and level.reference is not None]
+    if said and said[-1] is False:
+        return None
+    fields: dict[str, Any] = {
+        "integrator": catalog.resolve("integrator", "path"),
+        "sampler": catalog.resolve("sampler", "independent"),
+        "asked_total": 4096,
+        "replicates": 2,
+    }
+    for level in said:
+        fields |= level if isinstance(level, Mapping) else {}
+    asked = -(-fields["asked_total"] // fields["replicates"])
+    where = f"spp of the reference of {common.table.where}"
+    spp = common.table.problems.attempt(lambda: catalog.rendered_spp(fields["sampler"], asked, where))
+    return ReferenceRequest(spp=spp or asked, asked=asked, **fields)
+
+
+def _check_references(grid: Table, scenes: Iterable[SceneRequest], integrators: Sequence[Choice]) -> None:
+    """A reference has to count the same paths as the cells that it serves."""
+    for scene in scenes:
+        if scene.reference is None:
+            continue
+        reference = scene.reference.integrator
+        for integrator in integrators:
+            depth = path_lengths(integrator, scene.max_depth)
+            if path_lengths(reference, depth) != depth:
+                grid.problems.add(
+                    f"the reference of {scene.source.name} in {grid.where} is {reference.name}, which renders paths of "
+                    f"{path_lengths(reference, depth)} edges only, but {integrator.name} has max_depth {depth} there; "
+                    "choose a reference integrator that takes any max_depth, such as path"
+                )
+
+
+def _check_twins(grid: Table, scenes: Iterable[SceneRequest]) -> None:
+    """The same files with the same settings under two names would be one set of cells with two names."""
+    first: dict[tuple[object, ...], str] = {}
+    for scene in scenes:
+        key = (scene.source.digest, scene.width, scene.height, scene.crop, scene.max_depth)
+        other = first.setdefault(key, scene.source.name)
+        if other != scene.source.name:
+            names = f"{shown(other)} and {shown(scene.source.name)}"
+            grid.problems.add(f"scenes of {grid.where}: {names} are one scene with the same settings; leave one out")
