@@ -69,7 +69,7 @@ class Frame:
         One ray a lane → (rays, their weights, film positions in pixels).
 
         Draws film 2D, lens 2D if the sensor has one, time 1D if the shutter opens, wavelength 1D in spectral
-        modes. k is opaque, so that every pass size shares one kernel.
+        modes. k is opaque, as is the scale of differentials: one kernel serves every spp.
         """
         lane = dr.arange(mi.UInt32, self.lanes)
         pixel = lane // dr.opaque(mi.UInt32, self.samples)
@@ -84,7 +84,7 @@ class Frame:
         wavelength = sampler.next_1d() if mi.is_spectral else mi.Float(0)
         on_film = (position - mi.Vector2f(*self.offset)) / mi.Vector2f(self.width, self.height)
         rays, weights = self.sensor.sample_ray_differential(time, wavelength, mi.Point2f(on_film), lens)
-        rays.scale_differential(mi.Float(self.diff_scale))
+        rays.scale_differential(dr.opaque(mi.Float, self.diff_scale))
         return rays, weights, position
 
     def gather(self, position: Any, light: Any, wavelengths: Any) -> PassSum:
