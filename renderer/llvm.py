@@ -16,6 +16,7 @@ package under `.llvm/`, the default for everybody else) or `off`.
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -291,7 +292,8 @@ def write_note(name: str, note: Mapping[str, Any]) -> None:
         beside.write_text(json.dumps(note, indent=1), "utf-8")
         beside.replace(file)
     except OSError:
-        beside.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            beside.unlink()
 
 
 # ---------------------------------------------------------------------------------------------- how to get one
