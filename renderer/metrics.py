@@ -101,8 +101,9 @@ def measure(picture: Picture, reference: Reference) -> dict[str, float]:
 
     Raises ``ValueError`` if the shapes differ: metrics never compare, crop or resize in silence.
     """
-    if picture.shape != reference.first.shape:
-        raise ValueError(f"the picture is {shape(picture)}, the reference {shape(reference.first)}")
+    for half in (reference.first, reference.second):
+        if half is not None and half.shape != picture.shape:
+            raise ValueError(f"the picture is {shape(picture)}, the reference {shape(half)}")
     return {
         name: metric.value(picture, reference)
         for name, metric in METRICS.items()

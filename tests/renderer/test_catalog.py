@@ -1,0 +1,194 @@
+"""The catalog against Mitsuba, and against what people type."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from renderer import catalog
+from renderer.errors import BadParameter, DartboardError, UnknownName
+from renderer.spec import Choice
+
+AXES = ("sampler", "integrator", "rfilter")
+ENTRIES = [entry for axis in AXES for entry in catalog.entries(axis).values()]
+PARAMETERS = [(entry, parameter) for entry in ENTRIES for parameter in entry.parameters]
+SAMPLERS = [entry for entry in ENTRIES if entry.axis == "sampler"]
+LARGE = [1000, 1023, 1024, 1025, 4095, 4096, 4097, 10_000, 65_536, 99_999, 10**6, 3 * 10**6, 9_998_244]
+
+
+@pytest.fixture(scope="module")
+def mi():
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("llvm_ad_rgb")
+    mi.set_log_level(mi.LogLevel.Error)  # samplers announce every rounding
+    return mi
+
+
+def named(items):
+    """Entries and their parameters by name, for test ids."""
+    return {
+        "argvalues": items,
+        "ids": [getattr(item, "name", "") or f"{item[0].name}.{item[1].name}" for item in items],
+    }
+
+
+def extremes(parameter):
+    """Default, minimum and maximum of a parameter, those that there are, as its type."""
+    given = (parameter.default, parameter.minimum, parameter.maximum)
+    return [parameter.kind(value) for value in given if value is not None] or [parameter.kind()]
+
+
+@pytest.mark.parametrize("entry", **named(SAMPLERS))
+def test_rounding_is_what_mitsuba_renders(mi, entry):
+    """Small requests, where every rule has its exceptions, and some large ones."""
+    for asked in [*range(1, 301), *LARGE]:
+        rounded = entry.rounds(asked)
+        if rounded <= catalog.MAX_SPP:
+            rendered = mi.load_dict({"type": entry.plugin, "sample_count": asked}).sample_count()
+            assert (asked, rounded) == (asked, rendered)
+
+
+@pytest.mark.parametrize("entry", **named(SAMPLERS))
+@given(first=st.integers(1, 10**5), second=st.integers(1, 10**5))
+def test_rounding_goes_up_keeps_order_and_settles(entry, first, second):
+    """A grid relies on it: the largest request shows whether any is rounded past the limit."""
+    first, second = sorted((first, second))
+    assert first <= entry.rounds(first) <= entry.rounds(second)
+    assert entry.rounds(entry.rounds(first)) == entry.rounds(first)
+
+
+@pytest.mark.parametrize(("entry", "parameter"), **named(PARAMETERS))
+def test_mitsuba_takes_every_parameter_over_its_whole_range(mi, entry, parameter):
+    for value in extremes(parameter):
+        mi.load_dict({"type": entry.plugin, parameter.name: value})
+
+
+@pytest.mark.parametrize(("entry", "parameter"), **named(PARAMETERS))
+def test_a_parameter_survives_the_digest_text(mi, entry, parameter):
+    """Canonical text turns 1.0 into 1; Mitsuba takes that too."""
+    for value in extremes(parameter):
+        choice = Choice.of(json.loads(Choice(entry.name, 1, ((parameter.name, value),)).text))
+        mi.load_dict({"type": entry.plugin, **dict(choice.parameters)})
+
+
+@pytest.mark.parametrize("entry", **named(ENTRIES))
+def test_the_default_of_the_catalog_is_the_one_of_mitsuba(mi, entry):
+    """A plugin with our defaults prints the same as one with its own, so ``path`` means what people expect."""
+    ours = dict(catalog.resolve(entry.axis, entry.name).parameters)
+    assert str(mi.load_dict({"type": entry.plugin, **ours})) == str(mi.load_dict({"type": entry.plugin}))
+
+
+@pytest.mark.parametrize(
+    ("axis", "spellings"),
+    [
+        ("sampler", ["independent", "random", {"type": "random"}]),
+        ("sampler", ["stratified", {"type": "stratified", "jitter": True}, "stratified:jitter=true"]),
+        ("sampler", ["multijitter:jitter=false", {"type": "multijitter", "jitter": "False"}]),
+        ("integrator", ["path:max_depth=6", {"type": "path", "max_depth": 6.0}, "path:rr_depth=5,max_depth=6"]),
+        ("integrator", [{"rr_depth": 3, "type": "path", "max_depth": 6}, " path:max_depth=6, rr_depth = 3"]),
+        ("rfilter", ["tent", "tent:radius=1", {"type": "tent", "radius": 1.0}]),
+    ],
+)
+def test_spellings_of_one_value_are_one_choice(axis, spellings):
+    texts = {catalog.resolve(axis, spelling).text for spelling in spellings}
+    assert len(texts) == 1, texts
+
+
+@st.composite
+def chosen(draw):
+    """(axis, choice) with parameters anywhere in their ranges."""
+    entry = draw(st.sampled_from(ENTRIES))
+    values = {}
+    for parameter in entry.parameters:
+        bounds = {
+            "min_value": parameter.minimum,
+            "max_value": 100 if parameter.maximum is None else parameter.maximum,
+        }
+        kinds = {
+            bool: st.booleans(),
+            int: st.integers(**bounds).filter(lambda value, banned=parameter.banned: value not in banned),
+            float: st.floats(**bounds),
+        }
+        if draw(st.booleans()):
+            values[parameter.name] = draw(kinds[parameter.kind])
+    return entry.axis, catalog.resolve(entry.axis, {"type": entry.name, **values})
+
+
+@given(chosen())
+def test_a_label_reads_back_as_the_same_choice(pair):
+    """What results and plots print can be typed into the next grid."""
+    axis, choice = pair
+    assert catalog.resolve(axis, catalog.label(axis, choice)) == choice
+
+
+def test_a_label_shows_only_what_differs_from_the_default():
+    assert catalog.label("sampler", catalog.resolve("sampler", "random")) == "independent"
+    both = catalog.resolve("integrator", {"type": "path", "rr_depth": 5, "max_depth": 8, "hide_emitters": True})
+    assert catalog.label("integrator", both) == "path:hide_emitters=true,max_depth=8"
+
+
+@pytest.mark.parametrize(
+    ("axis", "value", "words"),
+    [
+        ("sampler", "stratifed", ["stratifed", "grid.toml", "known: ", "did you mean 'stratified'"]),
+        ("integrator", "bdpd", ["bdpd", "integrator", "known: direct, path"]),
+        ("sampler", "stratified:jiter=true", ["jiter", "stratified", "known: jitter"]),
+        ("sampler", "independent:jitter=true", ["jitter", "known: none"]),
+    ],
+)
+def test_unknown_names_come_with_the_known_ones(axis, value, words):
+    with pytest.raises(UnknownName) as caught:
+        catalog.resolve(axis, value, "grid.toml")
+    assert all(word in str(caught.value) for word in words), caught.value
+
+
+@pytest.mark.parametrize("value", [0, -2, 2.5, "six", True, None, [6], 10**7, 10**400, float("nan"), float("inf")])
+def test_a_parameter_out_of_range_names_value_place_and_range(value):
+    with pytest.raises(BadParameter) as caught:
+        catalog.resolve("integrator", {"type": "path", "max_depth": value}, "grid.toml")
+    assert "max_depth" in str(caught.value) and "grid.toml" in str(caught.value)
+    assert "an integer from -1 to 1000000, not 0" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [0.49, 17, 10**400, float("nan"), "wide", False])
+def test_numbers_out_of_range_are_refused(value):
+    with pytest.raises(BadParameter, match=r"a number from 0\.5 to 16"):
+        catalog.resolve("rfilter", {"type": "tent", "radius": value})
+
+
+@pytest.mark.parametrize("value", [None, 3, [], {}, {"type": 3}, "path:max_depth", "path:=3", "path:,"])
+def test_what_is_no_axis_value_is_told_how_to_write_one(value):
+    with pytest.raises(DartboardError, match="NAME"):
+        catalog.resolve("integrator", value)
+
+
+@pytest.mark.parametrize("asked", [0, -1, 10**9, 2.5, "16", True, None])
+def test_impossible_spp_are_refused(asked):
+    with pytest.raises(BadParameter, match="from 1 to 10000000"):
+        catalog.rendered_spp(catalog.resolve("sampler", "independent"), asked)
+
+
+def test_rounding_past_the_limit_is_refused():
+    with pytest.raises(BadParameter, match="ldsampler rounds 5000000 .* up to 16777216"):
+        catalog.rendered_spp(catalog.resolve("sampler", "ldsampler"), 5 * 10**6)
+
+
+def test_the_catalog_as_json_holds_everything():
+    told = json.loads(json.dumps(catalog.as_json()))
+    assert set(told) == {"samplers", "integrators", "rfilters", "scenes", "metrics"}
+    assert {row["name"] for row in told["samplers"]} == set(catalog.entries("sampler"))
+    assert {"cornell_box", "defocus"} <= {row["name"] for row in told["scenes"]}
+    assert all(row["line"] for rows in told.values() for row in rows)
+
+
+def test_the_catalog_needs_no_mitsuba():
+    code = "import sys; from renderer import catalog; catalog.as_json(); print('mitsuba' in sys.modules)"
+    root = Path(catalog.__file__).parents[1]
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
+    assert run.stdout.strip() == "False", run.stderr
