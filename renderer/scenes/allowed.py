@@ -7,12 +7,15 @@ All of it is written out as allow-lists, so what a later Mitsuba adds is refused
 
 from __future__ import annotations
 
+import difflib
 import re
 from pathlib import PurePosixPath
 
+from renderer.errors import shown
+
 # What Mitsuba 3.9 ships, without
-#   blender                     reads memory at an address that the file names
-#   batch, irradiancemeter, radiancemeter   no picture of a scene: several cameras, or one number
+#   blender                                 reads memory at an address that the file names
+#   batch, irradiancemeter, radiancemeter   make no picture of a scene: several cameras in one film, or one number
 PLUGINS = frozenset(
     """
     area aov bitmap blackbody blendbsdf blendphase box bsplinecurve bumpmap catmullrom checkerboard circular conductor
@@ -58,6 +61,13 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
 }
 
 
+def unknown_plugin(name: str | None) -> str:
+    """The sentence for a plugin that is not in the lists."""
+    close = difflib.get_close_matches(name or "", PLUGINS, n=1)
+    hint = f"did you mean {close[0]!r}?" if close else "known are the plugins that Mitsuba 3.9 ships"
+    return f"unknown plugin type {shown(name or '')}; {hint}"
+
+
 def string_fault(value: str) -> str | None:
     """
     Why a text value that is not a file name is refused, or None.
@@ -81,8 +91,3 @@ def file_fault(value: str) -> str | None:
     if "plugins" in (part.lower() for part in path.parts):
         return "is in a folder named 'plugins', where Mitsuba looks for code; rename the folder"
     return None
-
-
-def shown(value: str) -> str:
-    """A value for a message: quoted, without control characters, and never a page long."""
-    return repr(value if len(value) <= 120 else value[:117] + "...")

@@ -20,8 +20,8 @@ from typing import Any
 
 import mitsuba as mi
 
-from renderer.errors import SceneError
-from renderer.scenes.allowed import PLUGINS, PYTHON_PLUGINS, file_fault, shown, string_fault
+from renderer.errors import SceneError, shown
+from renderer.scenes.allowed import PLUGINS, PYTHON_PLUGINS, file_fault, string_fault, unknown_plugin
 
 MESSAGE_MAX = 400  # characters of Mitsuba's own text in an error
 
@@ -64,7 +64,7 @@ def load(
     config.parallel = False  # a fixed order of plugins is a fixed kernel, found again in the cache
     with _loading:
         try:
-            state = mi.parser.parse_file(config, str(folder / main))
+            state = _parse(config, folder, main)
             if reasons := check_nodes(state, folder):
                 raise SceneError(f"the scene {main} is refused: " + "; ".join(reasons))
             mi.parser.transform_upgrade(config, state)
@@ -79,6 +79,23 @@ def load(
     return LoadedScene(scene, scene.sensors()[0], width, height, crop or (0, 0, width, height))
 
 
+def _parse(config: mi.parser.ParserConfig, folder: Path, main: str) -> mi.parser.ParserState:
+    """
+    Mitsuba's nodes of a scene file, with the scene's folder as the first place to look for spectra and includes.
+
+    Only here: what is instantiated finds its files by absolute names, and code is never looked for in the folder.
+    """
+    core: Any = mi  # whose stubs lack the resolver
+    outer = core.file_resolver()
+    inner = core.FileResolver(outer)
+    inner.prepend(str(folder))
+    core.set_file_resolver(inner)
+    try:
+        return mi.parser.parse_file(config, str(folder / main))
+    finally:
+        core.set_file_resolver(outer)
+
+
 def check_nodes(state: mi.parser.ParserState, folder: Path) -> list[str]:
     """Reasons to refuse a scene as Mitsuba itself has read it; ``folder`` is resolved. Instantiates nothing."""
     reasons = []
@@ -89,7 +106,7 @@ def check_nodes(state: mi.parser.ParserState, folder: Path) -> list[str]:
     for index, node in enumerate(mi.parser.ParserState(state).nodes):
         plugin = node.props.plugin_name()
         if plugin not in PLUGINS | PYTHON_PLUGINS and not (plugin == "scene" and index == 0):
-            reasons.append(f"unknown plugin type {plugin!r}")
+            reasons.append(unknown_plugin(plugin))
         if (index == 0) != (node.type == mi.ObjectType.Scene):
             reasons.append("it is not one <scene>")
         for key, value in node.props.items():

@@ -21,7 +21,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from renderer.errors import SceneError, UnknownName
+from renderer.errors import EnvironmentProblem, SceneError, UnknownName, shown
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.defaults import SceneDefaults, defaults_of
 from renderer.scenes.vet import SceneFile, examine
@@ -29,6 +29,7 @@ from renderer.scenes.vet import SceneFile, examine
 __all__ = ["SceneDefaults", "SceneFile", "SceneSource", "find", "snapshot"]
 
 MAIN = "scene.xml"  # the main file of a folder that holds several
+REASONS_SHOWN = 3  # in one error; ``vet`` gives all
 ABANDONED_S = 3600  # a half-made copy that is older belongs to a process that was killed
 
 
@@ -62,7 +63,7 @@ def find(name: str, base: Path) -> SceneSource:
     """
     if name in BUILTIN:
         return _read(name, BUILTIN[name].folder, MAIN, builtin=True)
-    path = base / name
+    path = base.absolute() / name
     try:
         is_folder, is_file = path.is_dir(), path.is_file()
     except (OSError, ValueError):  # a name that no file system takes
@@ -72,10 +73,10 @@ def find(name: str, base: Path) -> SceneSource:
     if is_file and path.suffix.lower() == ".xml":
         return _read(name, path.parent, path.name, builtin=False)
     if is_file:
-        raise SceneError(f"scene {name!r} is not an .xml file; name a Mitsuba XML file or a folder that holds one")
+        raise SceneError(f"scene {shown(name)} is not an .xml file; name a Mitsuba XML file or a folder that holds one")
     if "/" not in name and "." not in name:
         raise UnknownName("scene", name, "", BUILTIN)
-    raise SceneError(f"scene {name!r} does not exist in {base}; a scene is a path from there, or one of {_builtins()}")
+    raise SceneError(f"scene {shown(name)} is not in {base}; a scene is a path from there, or one of {_builtins()}")
 
 
 def snapshot(source: SceneSource, into: Path) -> Path:
@@ -83,18 +84,27 @@ def snapshot(source: SceneSource, into: Path) -> Path:
     Copies the scene to ``into/<digest>/`` and returns that folder; does nothing where it is already there.
 
     Written beside, flushed, then renamed: the folder is complete or absent, also when several processes copy at once
-    or one is killed. Raises ``SceneError`` when a file is no longer the one that was vetted.
+    or one is killed. Raises ``SceneError`` when a file is no longer the one that was vetted, ``EnvironmentProblem``
+    when ``into`` cannot be written.
     """
     target = into / source.digest
     if target.is_dir():
         return target
-    into.mkdir(parents=True, exist_ok=True)
-    _sweep(into)
-    work = Path(tempfile.mkdtemp(prefix=".scene-", dir=into))
+    try:
+        into.mkdir(parents=True, exist_ok=True)
+        _sweep(into)
+        return _make(source, target)
+    except OSError as error:
+        reason = f"{error.strerror}; free space there or name another folder"
+        raise EnvironmentProblem(f"cannot copy scene {source.name!r} to {into}: {reason}") from error
+
+
+def _make(source: SceneSource, target: Path) -> Path:
+    work = Path(tempfile.mkdtemp(prefix=".scene-", dir=target.parent))
     try:
         for file in source.files:
             _copy(source, file, work)
-        for folder in [*{(work / file.path).parent for file in source.files}, work]:
+        for folder in [*(path for path in work.rglob("*") if path.is_dir()), work]:
             _flush(folder)
         work.chmod(0o755)  # mkdtemp's 0700 would hide it from a render process of another user
         try:
@@ -102,7 +112,7 @@ def snapshot(source: SceneSource, into: Path) -> Path:
         except OSError:
             if not target.is_dir():  # else another process was first; its copy is the same by digest
                 raise
-        _flush(into)
+        _flush(target.parent)
         return target
     finally:
         shutil.rmtree(work, ignore_errors=True)
@@ -117,7 +127,9 @@ def digest_of(main: str, files: Iterable[SceneFile]) -> str:
 def _read(name: str, folder: Path, main: str, builtin: bool) -> SceneSource:
     found = examine(folder, main)
     if found.reasons or found.root is None:
-        raise SceneError(f"scene {name!r} is refused: " + "; ".join(found.reasons))
+        first, more = found.reasons[:REASONS_SHOWN], len(found.reasons) - REASONS_SHOWN
+        rest = f"; and {more} more" if more > 0 else ""
+        raise SceneError(f"scene {shown(name)} is refused: {'; '.join(first)}{rest}")
     files = tuple(sorted(found.files.values(), key=lambda file: file.path))
     return SceneSource(name, folder, main, files, digest_of(main, files), builtin, defaults_of(found.root))
 
@@ -129,7 +141,7 @@ def _main_of(folder: Path, name: str) -> str:
     if len(found) == 1:
         return found[0]
     held = f"the {len(found)} files {', '.join(found[:5])}" if found else "no .xml file"
-    raise SceneError(f"the folder {name!r} holds {held}; name the file, or call the main one {MAIN}")
+    raise SceneError(f"the folder {shown(name)} holds {held}; name the file, or call the main one {MAIN}")
 
 
 def _builtins() -> str:

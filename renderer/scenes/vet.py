@@ -13,11 +13,13 @@ is confined besides. No Mitsuba here.
 from __future__ import annotations
 
 import hashlib
+import os
 import re
 import stat
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
+from renderer.errors import shown
 from renderer.scenes.allowed import (
     ATTRIBUTES,
     EXTENSIONS,
@@ -25,8 +27,8 @@ from renderer.scenes.allowed import (
     PLUGINS,
     PYTHON_PLUGINS,
     file_fault,
-    shown,
     string_fault,
+    unknown_plugin,
 )
 from renderer.scenes.xmlfile import Element, Unreadable, parse
 
@@ -64,7 +66,10 @@ def vet(folder: Path, main: str) -> list[str]:
 def examine(folder: Path, main: str) -> Examination:
     """Reads ``folder/main`` and all it refers to. Raises nothing for a bad scene: that is in ``reasons``."""
     reader = _Reader(folder)
-    reader.result.root = reader.read_main(main)
+    try:
+        reader.result.root = reader.read_main(main)
+    except OSError as error:  # no right to read, or removed meanwhile
+        reader.refuse(f"{Path(str(error.filename)).name!r} cannot be read: {error.strerror}")
     return reader.result
 
 
@@ -76,7 +81,7 @@ class _Reader:
         self.home = folder.resolve()
         self.result = Examination()
         self.parameters: list[tuple[str, str]] = []  # ("$name", value), longest name first, as Mitsuba keeps them
-        self.xml_bytes = 0
+        self.xml_bytes = self.xml_files = 0
         self.size = 0
         self.including: list[str] = []  # the chain of files that is being read, main first
 
@@ -101,8 +106,10 @@ class _Reader:
         if found is None:
             return None
         self.xml_bytes += found.stat().st_size
-        if self.xml_bytes > XML_BYTES_MAX:
-            self.refuse(f"{path}: the scene files are larger than {XML_BYTES_MAX >> 20} MiB; put meshes in .ply files")
+        self.xml_files += 1
+        if self.xml_bytes > XML_BYTES_MAX or self.xml_files > FILES_MAX:
+            most = f"{XML_BYTES_MAX >> 20} MiB or {FILES_MAX} includes"
+            self.refuse(f"{path}: the scene has more than {most} of XML; put meshes in .ply files")
             return None
         data = found.read_bytes()  # what is examined is what is hashed, whatever becomes of the file meanwhile
         self.record(path, hashlib.sha256(data).hexdigest(), len(data))
@@ -157,7 +164,7 @@ class _Reader:
         tag, value = element.tag, element.attributes.get("value", "")
         kind = element.attributes.get("type")
         if tag in OBJECTS and (kind is not None or tag != "spectrum") and kind not in PLUGINS | PYTHON_PLUGINS:
-            self.refuse(f"{place}: unknown plugin type {kind!r}; allowed are the plugins that Mitsuba 3.9 ships")
+            self.refuse(f"{place}: {unknown_plugin(kind)}")
         if tag == "default":
             self.define("$" + element.attributes.get("name", ""), value, place)
         if tag == "spectrum" and "filename" in written:
@@ -198,6 +205,9 @@ class _Reader:
         target = self.resolve(written, place, frozenset({".xml"}))
         if target is None:
             return []
+        # Mitsuba looks in the including file's folder first, then outwards along the chain, last in the main one.
+        around = [(PurePosixPath(file).parent / target).as_posix() for file in reversed(self.including)]
+        target = next((name for name in around if os.path.lexists(self.folder / name)), target)
         if target in self.including:
             self.refuse(f"{place}: {target} includes itself")
             return []
@@ -228,7 +238,7 @@ class _Reader:
         """
         A file name as written, made canonical, or None (and a reason) when its spelling is refused.
 
-        Names are relative to the main file's folder, in included files too: there Mitsuba 3.9 looks.
+        Names of what plugins read are relative to the main file's folder, in included files too, as in Mitsuba 3.9.
         """
         path = PurePosixPath(written)
         if fault := file_fault(written):

@@ -37,6 +37,8 @@ def parse(data: bytes) -> Element:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
         raise Unreadable(f"is not UTF-8 (byte {error.start}); save it as UTF-8") from None
+    if "\0" in text:  # UTF-16 of plain letters is also UTF-8, and both readers would guess
+        raise Unreadable("is not UTF-8 text (it holds zero bytes); save it as UTF-8")
     if not text.strip("\ufeff \t\r\n"):
         raise Unreadable("is empty")
     builder = _Builder()
@@ -55,7 +57,7 @@ class _Builder:
         self.root: Element | None = None
         self.open: list[Element] = []
         self.count = 0
-        self.expat = expat.ParserCreate()
+        self.expat = expat.ParserCreate("utf-8")
         self.expat.StartElementHandler = self.start
         self.expat.EndElementHandler = self.end
         self.expat.XmlDeclHandler = self.declaration
