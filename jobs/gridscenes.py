@@ -194,14 +194,15 @@ def _check_references(grid: Table, scenes: Iterable[SceneRequest], integrators: 
     for scene in scenes:
         if scene.reference is None:
             continue
-        reference = scene.reference.integrator
+        reference = scene.reference.integrator.name
+        fixed = catalog.find("integrator", reference).depth
         for integrator in integrators:
             depth = path_lengths(integrator, scene.max_depth)
-            if path_lengths(reference, depth) != depth:
+            if fixed not in (None, depth):
                 grid.problems.add(
-                    f"the reference of {scene.source.name} in {grid.where} is {reference.name}, which renders paths of "
-                    f"{path_lengths(reference, depth)} edges only, but {integrator.name} has max_depth {depth} there; "
-                    "choose a reference integrator that takes any max_depth, such as path"
+                    f"the reference of {scene.source.name} in {grid.where} is {reference}, which renders paths of "
+                    f"{fixed} edges only, but {integrator.name} has max_depth {depth} there; choose a reference "
+                    "integrator that takes any max_depth, such as path"
                 )
 
 
