@@ -75,7 +75,9 @@ def _open(path: Path, **options: bool) -> Iterator[Any]:
         with _stdout_to_stderr():
             file = OpenEXR.File(str(path), **options)
     except Exception as error:  # RuntimeError, ValueError or UnicodeDecodeError, by the kind of damage
-        raise DartboardError(f"{path} cannot be read as OpenEXR ({type(error).__name__}); is it an EXR file?") from error
+        raise DartboardError(
+            f"{path} cannot be read as OpenEXR ({type(error).__name__}); is it an EXR file?"
+        ) from error
     with file:
         yield file
 

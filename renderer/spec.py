@@ -183,5 +183,3 @@ def seed(digest: str, replicate: int, *, reference: bool = False) -> int:
     """
     bits = int.from_bytes(hashlib.sha256(f"{digest}:{replicate}".encode("ascii")).digest()[:4], "big")
     return bits >> (32 - SEED_BITS) | (int(reference) << SEED_BITS)
-
-
