@@ -69,11 +69,11 @@ def doctor(data: Path) -> list[Line]:
 def show(lines: list[Line]) -> None:
     """The findings as a table on stdout, coloured where the terminal can."""
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
     from rich.text import Text
 
     looks = {"ok": ("ok", "green"), "warn": ("so-so", "yellow"), "bad": ("bad", "bold red")}
-    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table = Table(Column(), Column(), Column(overflow="fold"), box=None, show_header=False, padding=(0, 2, 0, 0))
     for line in lines:
         word, colour = looks[line.state]
         value = Text(line.value)
