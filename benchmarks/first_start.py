@@ -119,11 +119,10 @@ def until_first_picture(folder: Path, grid: str) -> tuple[float | None, list[tup
 
 
 def phases(start: str, said: list[tuple[float, str]]) -> list[tuple[str, float, float | None]]:
-    """The launcher's own account: `ready in 17.0 s: .venv 0.1 s, packages 16.7 s, LLVM 0.2 s`."""
-    ready = next((line for _, line in said if "ready in" in line), "")
-    found = re.findall(r"(\S+) ([\d.]+) s", ready.partition(": ready")[2].partition(":")[2])
-    labels = {"LLVM": "LLVM, after the packages"}
-    return [(f"{start} start: {labels.get(name, name)}", float(seconds), None) for name, seconds in found]
+    """The launcher's own account: `ready in 17.0 s: .venv 0.1 s, packages 16.7 s, …`."""
+    account = next((line.partition(" s: ")[2] for _, line in said if "ready in" in line), "")
+    found = re.findall(r"([^,]+?) ([\d.]+) s(?:, |$)", account)
+    return [(f"{start} start: {name}", float(seconds), None) for name, seconds in found]
 
 
 if __name__ == "__main__":
