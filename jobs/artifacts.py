@@ -1,0 +1,92 @@
+"""
+Files of a data directory, by digest: written beside, brought to disk, then moved into place in one step.
+
+A row is committed after its file is in place, so a row without its file cannot be; a file without its row (a
+process died in between) is overwritten by the next attempt. Policy: pictures are fsynced before they are
+moved, their folders are not; docs/storage.md says what that survives.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+from jobs.errors import DataDirectoryProblem
+
+
+class Artifacts:
+    """
+    Where everything of a data directory lies. Names that go into the database are relative to ``data``.
+
+    work  pictures on their way from a render process; emptied by every new owner
+    """
+
+    def __init__(self, data: Path):
+        self.data = data.resolve()
+        self.work = self.data / "work"
+        self.logs = self.data / "logs"
+        self.scenes = self.data / "scenes"
+        self.previews = self.data / "previews"
+        self.empty = self.data / "work" / "empty"  # working directory of render processes
+
+    def prepare(self) -> None:
+        """What a new owner needs: the folders, and no leftovers of its predecessor."""
+        try:
+            for leftover in (self.work, self.previews):
+                shutil.rmtree(leftover, ignore_errors=True)
+            for folder in (self.work, self.logs, self.scenes, self.previews, self.empty):
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise self._problem(error) from error
+
+    def picture(self, digest: str, role: str, k: int) -> str:
+        """Name of a replicate's EXR: ``images/ab/<digest>/cell-000.exr``."""
+        return f"images/{digest[:2]}/{digest}/{role}-{k:03}.exr"
+
+    def preview(self, digest: str) -> Path:
+        """Path of the small picture that refines while a cell renders."""
+        return self.previews / f"{digest}.png"
+
+    def scene_folder(self, digest: str) -> Path:
+        """Path of a scene's snapshot."""
+        return self.scenes / digest
+
+    def path(self, name: str) -> Path:
+        """The path of a name that the database holds."""
+        return self.data / name
+
+    def adopt(self, temporary: Path, name: str) -> None:
+        """
+        Bring a finished file to disk and move it to ``name``, in one step for every reader.
+
+        Raises ``DataDirectoryProblem`` for a disk that is full or cannot be written; the temporary file stays.
+        """
+        final = self.data / name
+        try:
+            descriptor = os.open(temporary, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+            final.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(temporary, final)
+        except OSError as error:
+            raise self._problem(error) from error
+
+    def write_log(self, attempt: int, text: str) -> str | None:
+        """Keep the log of an attempt that went wrong; its name, or None where there is nothing to keep."""
+        if not text.strip():
+            return None
+        name = f"logs/attempt-{attempt}.log"
+        try:
+            self.path(name).write_text(text, encoding="utf-8")
+        except OSError as error:
+            raise self._problem(error) from error
+        return name
+
+    def _problem(self, error: OSError) -> DataDirectoryProblem:
+        return DataDirectoryProblem(
+            f"cannot write to the data directory {self.data}: {error.strerror}; free some space or choose another "
+            f"--data DIR, then run again: nothing that was finished is lost"
+        )

@@ -1,0 +1,267 @@
+-- Every statement that the program runs, by name. Lists come in as JSON arrays.
+
+-- name: revision
+select seq from sqlite_sequence where name = 'event';
+
+-- name: add_event
+insert into event (at, what, cell_id, experiment_id) values (:at, :what, :cell_id, :experiment_id);
+
+
+-- Scenes and experiments -------------------------------------------------------------------------------------------
+
+-- name: add_scene
+insert into scene (digest, name, main, builtin) values (:digest, :name, :main, :builtin) on conflict do nothing;
+
+-- name: scene_by_digest
+select * from scene where digest = :digest;
+
+-- name: experiment_by_digest
+select * from experiment where digest = :digest;
+
+-- name: experiment_by_id
+select * from experiment where id = :id;
+
+-- name: experiment_by_name
+select * from experiment where name = :name order by id desc limit 1;
+
+-- name: experiments
+select * from experiment order by id;
+
+-- name: add_experiment
+insert into experiment (digest, name, created_at, grid) values (:digest, :name, :created_at, :grid);
+
+-- name: add_cell
+insert into cell (digest, revision, scene_id, spp, pixels, estimand, spec)
+values (:digest, :revision, (select id from scene where digest = :scene), :spp, :pixels, :estimand, :spec)
+on conflict do nothing;
+
+-- name: count_cells
+select count(*) from cell;
+
+-- name: add_experiment_cell
+insert into experiment_cell (
+    experiment_id, position, cell_id, role, replicates, had, reference_id, spp_asked, scene, integrator, sampler)
+select
+    :experiment_id, :position, cell.id, :role, :replicates,
+    (select count(*) from replicate where cell_id = cell.id and role = :role and k < :replicates),
+    (select id from cell where digest = :reference), :spp_asked, :scene, :integrator, :sampler
+from cell where cell.digest = :digest;
+
+-- name: replicates_had
+select cell.digest, replicate.role, count(*) as had
+from replicate join cell on cell.id = replicate.cell_id
+group by replicate.cell_id, replicate.role;
+
+-- name: rates
+select wanted.scene, wanted.integrator, sum(samples) / sum(seconds) as rate
+from (
+    select cell.id as cell_id, sum(replicate.render_seconds) as seconds, sum(1.0 * cell.spp * cell.pixels) as samples
+    from replicate join cell on cell.id = replicate.cell_id
+    where replicate.machine = :machine
+    group by cell.id
+) as timed
+join experiment_cell as wanted on wanted.cell_id = timed.cell_id
+group by wanted.scene, wanted.integrator
+having sum(seconds) > 0;
+
+
+-- The queue: claiming ----------------------------------------------------------------------------------------------
+
+-- name: next_cell
+select cell.id, cell.digest, cell.spec
+from experiment_cell as wanted indexed by open_in_order
+cross join cell on cell.id = wanted.cell_id
+where wanted.open = 1 and cell.state = 'queued'
+order by wanted.priority desc, wanted.experiment_id, wanted.position
+limit 1;
+
+-- name: next_cell_of_experiment
+select cell.id, cell.digest, cell.spec
+from experiment_cell as wanted indexed by open_in_experiment
+cross join cell on cell.id = wanted.cell_id
+where wanted.open = 1 and wanted.experiment_id = :experiment_id and cell.state = 'queued'
+order by wanted.position
+limit 1;
+
+-- name: wanted_replicates
+select role, max(replicates) as replicates
+from experiment_cell
+where cell_id = :cell_id and open = 1 and (:experiment_id is null or experiment_id = :experiment_id)
+group by role order by role;
+
+-- name: had_replicates
+select role, k from replicate where cell_id = :cell_id;
+
+-- name: is_wanted
+select exists (select 1 from experiment_cell where cell_id = :cell_id and open = 1);
+
+
+-- The queue: changes of state --------------------------------------------------------------------------------------
+
+-- name: cell_state
+select state, crashes from cell where id = :cell_id;
+
+-- name: set_state
+update cell set state = :state, revision = :revision where id = :cell_id;
+
+-- name: set_states
+update cell set state = :target, revision = :revision
+where id in (select value from json_each(:cells)) and state = :source;
+
+-- name: set_crashes
+update cell set crashes = :crashes where id = :cell_id;
+
+-- name: set_error
+update cell set error_class = :error_class, error = :error where id = :cell_id;
+
+-- name: forgive
+update cell set crashes = 0, error_class = null, error = null
+where id in (select value from json_each(:cells)) and state = 'failed';
+
+-- name: touch
+update cell set revision = :revision where id = :cell_id;
+
+-- name: start_attempt
+insert into attempt (cell_id, machine, device, started_at) values (:cell_id, :machine, :device, :at);
+
+-- name: end_attempt
+update attempt set ended_at = :at, outcome = :outcome, error = :error, log = :log
+where id = :attempt_id and ended_at is null;
+
+-- name: end_attempts
+update attempt set ended_at = :at, outcome = :outcome
+where cell_id in (select value from json_each(:cells)) and ended_at is null;
+
+-- name: is_open
+select exists (select 1 from attempt where id = :attempt_id and ended_at is null);
+
+-- name: running_cells
+select id from cell where state = 'running';
+
+-- name: replicate_id
+select id from replicate where cell_id = :cell_id and role = :role and k = :k;
+
+-- name: add_replicate
+insert into replicate (
+    cell_id, role, k, seed, image, render_seconds, compile_seconds, machine, device, threads, neighbours,
+    attempt_id, finished_at)
+values (
+    :cell_id, :role, :k, :seed, :image, :render_seconds, :compile_seconds, :machine, :device, :threads, :neighbours,
+    :attempt_id, :at);
+
+-- name: close_cell
+update experiment_cell set open = 0 where cell_id = :cell_id and open = 1;
+
+
+-- The queue: what experiments want ---------------------------------------------------------------------------------
+
+-- name: set_cancelled
+update experiment set cancelled_at = :at where id = :experiment_id and (cancelled_at is null) = (:at is not null);
+
+-- name: close_experiment
+update experiment_cell set open = 0 where experiment_id = :experiment_id and open = 1;
+
+-- name: open_cells
+select distinct cell_id from experiment_cell where experiment_id = :experiment_id and open = 1;
+
+-- name: unwanted_cells
+select cell.id, cell.state from json_each(:cells) as given join cell on cell.id = given.value
+where not exists (select 1 from experiment_cell where cell_id = cell.id and open = 1);
+
+-- name: missing_cells
+select distinct cell.id, cell.state
+from experiment_cell as wanted join cell on cell.id = wanted.cell_id
+where wanted.experiment_id = :experiment_id and wanted.open = 0 and wanted.had < wanted.replicates;
+
+-- name: open_wanted
+update experiment_cell set open = 1
+where open = 0 and had < replicates and cell_id in (select value from json_each(:cells))
+    and experiment_id in (select id from experiment where cancelled_at is null);
+
+-- name: progress
+select role, state, count(*) as cells, sum(had) as had, sum(replicates) as wanted
+from (select distinct role, cell_id, state, had, replicates from standing where experiment_id = :experiment_id)
+group by role, state;
+
+-- name: samples_left
+select sum((replicates - had) * 1.0 * spp * pixels)
+from (
+    select distinct wanted.cell_id, wanted.role, wanted.replicates, wanted.had, cell.spp, cell.pixels
+    from experiment_cell as wanted join cell on cell.id = wanted.cell_id
+    where wanted.experiment_id = :experiment_id and wanted.open = 1);
+
+-- name: failures
+select
+    cell.id, cell.digest, wanted.role, wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp,
+    cell.error_class, cell.error, (select log from attempt where cell_id = cell.id order by id desc limit 1) as log
+from standing as wanted join cell on cell.id = wanted.cell_id
+where wanted.experiment_id = :experiment_id and wanted.state = 'failed'
+order by wanted.position;
+
+
+-- Results ----------------------------------------------------------------------------------------------------------
+
+-- name: results
+with recursive count (k) as (
+    select 0 union all
+    select k + 1 from count
+    where k + 1 < (select max(replicates) from experiment_cell where experiment_id = :experiment_id and role = 'cell')
+)
+select
+    experiment.name as experiment, wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp,
+    cell.spp as spp_actual, count.k as replicate, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    replicate.id as replicate_id, replicate.render_seconds, replicate.compile_seconds,
+    case when replicate.id is null then wanted.state else 'done' end as state
+from standing as wanted
+join experiment on experiment.id = wanted.experiment_id
+join cell on cell.id = wanted.cell_id
+join count on count.k < wanted.replicates
+left join replicate on replicate.cell_id = wanted.cell_id and replicate.role = 'cell' and replicate.k = count.k
+where wanted.experiment_id = :experiment_id and wanted.role = 'cell'
+order by wanted.position, count.k;
+
+-- name: metrics
+select distinct metric.replicate_id, metric.name, metric.version, metric.value
+from experiment_cell as wanted
+join experiment_cell as reference
+    on reference.cell_id = wanted.reference_id and reference.experiment_id = wanted.experiment_id
+    and reference.role = 'reference'
+join replicate
+    on replicate.cell_id = wanted.cell_id and replicate.role = 'cell' and replicate.k < wanted.replicates
+join metric
+    on metric.replicate_id = replicate.id and metric.reference_id = reference.cell_id
+    and metric.reference_replicates = reference.replicates and metric.region = ''
+where wanted.experiment_id = :experiment_id and wanted.role = 'cell';
+
+
+-- Measuring --------------------------------------------------------------------------------------------------------
+-- A pair is measurable once this experiment's own reference is complete.
+
+-- name: replicate_by_id
+select id, cell_id, role, k, image from replicate where id = :id;
+
+-- name: pairs_with_gaps
+select distinct replicate_id, image, reference_id, reference_replicates
+from pair
+where exists (
+    select 1 from json_each(:versions) as formula
+    where not exists (
+        select 1 from metric
+        where metric.replicate_id = pair.replicate_id and metric.reference_id = pair.reference_id
+            and metric.reference_replicates = pair.reference_replicates
+            and metric.name = formula.key and metric.version = formula.value and metric.region = ''))
+order by reference_id, replicate_id;
+
+-- name: pairs_of_replicate
+select distinct replicate_id, image, reference_id, reference_replicates from pair where replicate_id = :replicate_id;
+
+-- name: pairs_of_reference
+select distinct replicate_id, image, reference_id, reference_replicates from pair where reference_id = :cell_id
+order by replicate_id;
+
+-- name: reference_images
+select image from replicate where cell_id = :cell_id and role = 'reference' and k < :replicates order by k;
+
+-- name: add_metric
+insert or replace into metric (replicate_id, reference_id, reference_replicates, name, version, value, reason)
+values (:replicate_id, :reference_id, :reference_replicates, :name, :version, :value, :reason);
