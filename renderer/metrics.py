@@ -83,9 +83,11 @@ def _mean_ratio(picture: Picture, reference: Reference) -> Picture:
 METRICS: dict[str, Metric] = {
     metric.name: metric
     for metric in (
-        Metric("mse", 1, "mean((I − R)²), R = mean(R1, R2)", _mse, "plain mean squared error; includes the reference's noise"),
+        Metric("mse", 1, "mean((I − R)²), R = mean(R1, R2)", _mse,
+               "plain mean squared error; includes the reference's noise"),
         Metric("mse_cross", 1, "mean((I − R1)·(I − R2))", _mse_cross,
-               "unbiased for bias² + variance: no floor from the reference; may be negative when tiny", needs_halves=True),
+               "unbiased for bias² + variance: no floor from the reference; may be negative when tiny",
+               needs_halves=True),
         Metric("relmse", 1, "mean((I − R)² / (R² + ε)), ε = 0.01", _relmse,
                "squared error relative to the reference: a visible lamp does not rule it", RELMSE_EPSILON),
         Metric("mean_ratio", 1, "mean(I) / mean(R)", _mean_ratio,

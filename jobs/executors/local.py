@@ -199,8 +199,9 @@ class LocalExecutor:
             return
         assert child.process.stdout is not None
         while True:
-            data = child.process.stdout.read(65536)
-            if data is None:
+            try:
+                data = os.read(child.process.stdout.fileno(), 65536)
+            except BlockingIOError:
                 return
             if not data:
                 self._died(child)

@@ -1,0 +1,172 @@
+"""
+The dispatcher: the one loop that claims cells, hands them to an executor and records what comes back.
+
+It runs in the owner of the data directory, in one thread. A finished picture is moved into place and its row
+committed before the loop looks at anything else, so whatever dies next, that replicate stays. Measuring is
+done in small steps between events, while the executor draws the next cell. Whoever follows a run listens to
+``on_news`` and never touches the queue.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from jobs import inbox, queue
+from jobs.artifacts import Artifacts
+from jobs.executors.base import Done, Event, Executor, Failed, Finished, Order, Passed, Released, Started
+from jobs.measure import Measurer
+from jobs.queue import Work
+from jobs.store import Store
+
+WAIT_SECONDS = 0.25  # longest wait for an event: also how soon a request in the inbox is seen
+MEASURE_SECONDS = 0.02  # measured at a stretch between two looks at the executor
+
+log = logging.getLogger("dartboard")
+
+
+@dataclass(frozen=True)
+class News:
+    """
+    Something a person following the run may want to know.
+
+    kind   "started", "pass", "replicate", "done", "failed", "cancelled" or "requeued"
+    event  the executor's own event, with numbers
+    state  of the cell after it, where it has changed
+    """
+
+    kind: str
+    work: Work
+    event: Event
+    state: str = ""
+
+
+class Dispatcher:
+    """
+    Works for one experiment, or for all of them (``experiment`` None), until nothing is left to do.
+
+    ``stop`` may be called from a signal handler. Errors of the data directory (full, gone) end ``run`` with
+    ``DataDirectoryProblem``: what was committed stays, the rest is rendered by the next owner.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        artifacts: Artifacts,
+        executor: Executor,
+        *,
+        machine: str,
+        device: str,
+        experiment: int | None = None,
+        on_news: Callable[[News], None] = lambda news: None,
+    ):
+        self.store, self.artifacts, self.executor = store, artifacts, executor
+        self.machine, self.device, self.experiment, self.on_news = machine, device, experiment, on_news
+        self.measurer = Measurer(store, artifacts)
+        self.under_way: dict[int, Work] = {}  # order number → work
+        self.cancelled: set[int] = set()  # orders killed because nobody wants their cell any more
+        self.orders = 0
+        self.stopping = False
+
+    def stop(self) -> None:
+        """End ``run`` soon; what is being drawn goes back to the queue."""
+        self.stopping = True
+        self.executor.wake()
+
+    def run(self) -> None:
+        """Claim, render, record and measure until nothing is left or ``stop`` is called."""
+        self.measurer.look_for_gaps()
+        while not self.stopping:
+            self._answer_requests()
+            self._fill()
+            busy = self.measurer.step(MEASURE_SECONDS)
+            if not self.under_way and not busy:
+                return
+            for event in self.executor.events(0.0 if busy else WAIT_SECONDS):
+                self._record(event)
+        for work in self.under_way.values():
+            queue.release(self.store, work)
+        self.under_way.clear()
+
+    def _fill(self) -> None:
+        """Give the executor as much as it takes."""
+        while self.executor.room() and not self.stopping:
+            work = queue.claim(self.store, machine=self.machine, device=self.device, experiment=self.experiment)
+            if work is None:
+                return
+            self.orders += 1
+            scene = self.store.one("scene_by_digest", digest=work.spec.estimand.scene)
+            assert scene is not None, "a cell's scene is a foreign key"
+            self.under_way[self.orders] = work
+            self.executor.submit(
+                Order(
+                    order=self.orders,
+                    spec=work.spec.text,
+                    colour=work.spec.estimand.colour,
+                    scene=self.artifacts.scene_folder(work.spec.estimand.scene),
+                    main=scene["main"],
+                    trust="builtin" if scene["builtin"] else work.spec.estimand.scene,
+                    replicates=work.missing,
+                    out=self.artifacts.work,
+                    preview=self.artifacts.preview(work.digest),
+                )
+            )
+
+    def _record(self, event: Event) -> None:
+        work = self.under_way.get(event.order)
+        if work is None:
+            return  # an order that was cancelled while its last event was on its way
+        state, kind = "", "pass"
+        match event:
+            case Started():
+                kind = "started"
+            case Passed():
+                pass
+            case Finished():
+                kind = "replicate"
+                self._keep(work, event)
+            case Done():
+                kind, state = "done", queue.finish(self.store, work)
+            case Failed():
+                kept = self.artifacts.write_log(work.attempt_id, event.log)
+                state = queue.fail(self.store, work, event.error_class, event.message, kept)
+                kind = "failed" if state == "failed" else "requeued"
+            case Released():
+                if event.order in self.cancelled:
+                    kind = "cancelled"
+                else:
+                    queue.release(self.store, work)
+                    kind = "requeued"
+        if isinstance(event, (Done, Failed, Released)):
+            del self.under_way[event.order]
+            self.cancelled.discard(event.order)
+        self.on_news(News(kind, work, event, state))
+
+    def _keep(self, work: Work, event: Finished) -> None:
+        """Move a finished picture into place, commit its row, and queue it for measuring."""
+        image = self.artifacts.picture(work.digest, event.role, event.k)
+        self.artifacts.adopt(self.artifacts.work / event.file, image)
+        replicate = queue.finish_replicate(
+            self.store, work, event.role, event.k, image=image, seed=event.seed, render_seconds=event.render_seconds,
+            compile_seconds=event.compile_seconds, threads=event.threads, neighbours=event.neighbours,
+        )  # fmt: skip
+        self.measurer.add(replicate)
+
+    def _answer_requests(self) -> None:
+        """What `dartboard cancel` and `retry` asked of the owner."""
+        for request in inbox.take(self.artifacts.data):
+            self._answer(request)
+
+    def _answer(self, request: dict[str, Any]) -> None:
+        if request["do"] == "retry":
+            queue.retry(self.store, request["experiment"])
+        elif request["do"] == "cancel":
+            unwanted = set(queue.cancel(self.store, request["experiment"]))
+            for order, work in list(self.under_way.items()):
+                if work.cell_id in unwanted:
+                    self.cancelled.add(order)
+                    self.executor.cancel(order)
+        else:
+            log.warning("the inbox holds a request that this version does not know: %s", request["do"])

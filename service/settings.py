@@ -1,0 +1,21 @@
+"""Where things lie: the data directory and the kernel caches, from the command line, the environment, or by default."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+DEFAULT_DATA = "dartboard-data"
+
+
+def data_directory(given: Path | None) -> Path:
+    """``--data``, else the variable DARTBOARD_DATA, else ``./dartboard-data``; nothing is created."""
+    return Path(given or os.environ.get("DARTBOARD_DATA") or DEFAULT_DATA)
+
+
+def kernel_caches() -> Path:
+    """
+    The folder of the compiled kernels, one below it per trust class, shared by every data directory of a user:
+    a second experiment starts warm. In XDG_CACHE_HOME, else in ``~/.cache``.
+    """
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dartboard" / "kernels"

@@ -1,0 +1,103 @@
+"""Tables for people, on a terminal. Numbers that other programs read come from JSON and CSV instead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from jobs.results import Point
+from renderer.metrics import METRICS
+
+SHOWN = ("relmse", "mse_cross", "mse")  # the first that has values stands for the experiment
+
+
+def show_errors(points: list[Point]) -> None:
+    """
+    One table per scene and integrator: the error of every sampler at every spp, mean ± standard error.
+
+    The lowest of a row is bold; spp that a sampler rounded are shown beside its number.
+    """
+    metric = next((name for name in SHOWN if any(point.metric == name for point in points)), None)
+    if metric is None:
+        return
+    console = Console(highlight=False)
+    of_metric = [point for point in points if point.metric == metric]
+    for scene, integrator in dict.fromkeys((point.scene, point.integrator) for point in of_metric):
+        here = [point for point in of_metric if (point.scene, point.integrator) == (scene, integrator)]
+        samplers = list(dict.fromkeys(point.sampler for point in here))
+        table = Table(title=f"{scene} · {integrator}", title_justify="left", box=box.SIMPLE_HEAD)
+        table.add_column("spp", justify="right")
+        for sampler in samplers:
+            table.add_column(sampler, justify="right")
+        for spp in sorted({point.spp for point in here}):
+            found = {point.sampler: point for point in here if point.spp == spp}
+            best = min(point.mean for point in found.values())
+            table.add_row(str(spp), *(_cell(found.get(sampler), best) for sampler in samplers))
+        console.print(table)
+    replicates = sorted({point.n for point in of_metric})
+    counts = f"{replicates[0]}" if len(replicates) == 1 else f"{replicates[0]} to {replicates[-1]}"
+    console.print(f"{metric} = {METRICS[metric].formula}; mean ± standard error over {counts} replicates")
+
+
+def _cell(point: Point | None, best: float) -> Text:
+    if point is None:
+        return Text("–", style="dim")
+    error = f" ± {point.error:.1e}" if point.error is not None else ""
+    rounded = f" ({point.spp_actual} spp)" if point.spp_actual != point.spp else ""
+    return Text(f"{point.mean:.3e}{error}{rounded}", style="bold" if point.mean == best else "")
+
+
+def show_failures(failures: list[dict[str, Any]], data: Path) -> None:
+    """What failed, why, and where its log is."""
+    if not failures:
+        return
+    console = Console(stderr=True, highlight=False)
+    console.print(f"[red]{len(failures)} cells failed[/red]; `dartboard retry` queues them again")
+    for row in failures:
+        log = f" (log: {data / row['log']})" if row["log"] else ""
+        text = f"  {row['scene']} · {row['integrator']} · {row['sampler']} · {row['spp']} spp: {row['error']}{log}"
+        console.print(Text(text), soft_wrap=True)
+
+
+def show_metrics(told: dict[str, Any]) -> None:
+    """``dartboard measure``."""
+    console = Console(highlight=False)
+    table = Table(box=box.SIMPLE_HEAD)
+    for column in ("metric", "value", "formula"):
+        table.add_column(column, justify="right" if column == "value" else "left")
+    for name, metric in told["metrics"].items():
+        value = "not finite" if metric["value"] is None else f"{metric['value']:.6g}"
+        table.add_row(name, value, metric["formula"])
+    console.print(table)
+    for role, count in told["nonfinite_pixels"].items():
+        if count:
+            console.print(f"[red]{count} pixels of the {role} are NaN or infinite[/red]")
+
+
+def show_catalog(values: dict[str, list[dict[str, Any]]]) -> None:
+    """``dartboard catalog``."""
+    console = Console(highlight=False)
+    for axis, entries in values.items():
+        table = Table(title=axis, title_justify="left", box=box.SIMPLE_HEAD, show_header=False)
+        table.add_column(style="bold", no_wrap=True)
+        table.add_column()
+        for entry in entries:
+            lines = [entry["line"]]
+            if entry.get("aliases"):
+                lines.append(f"also called {', '.join(entry['aliases'])}")
+            if entry.get("rounding"):
+                lines.append(f"spp: {entry['rounding']}")
+            lines += [_parameter(item) for item in entry.get("parameters", [])]
+            table.add_row(entry["name"], "\n".join(lines))
+        console.print(table)
+
+
+def _parameter(item: dict[str, Any]) -> str:
+    default = "from the grid or the scene" if item["default"] is None else str(item["default"]).lower()
+    unit = f" {item['unit']}" if item["unit"] else ""
+    return f"  {item['name']} = {default}{unit}: {item['line']}"
