@@ -8,6 +8,7 @@ nothing; adding one spp creates only that. What becomes of the cells is the busi
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from jobs.errors import NotFound
 from jobs.plan import Plan, Role
 from jobs.store import Store, now
 from renderer.scenes import sources
+
+_ID = re.compile(r"[0-9]{1,18}")  # what SQLite can hold
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,7 @@ def submit(store: Store, plan: Plan, scenes: Path) -> tuple[Experiment, int]:
 
 def find(store: Store, id_or_name: str) -> Experiment:
     """The experiment of that id, else the newest of that name. Raises ``NotFound`` with those that are there."""
-    row = store.one("experiment_by_id", id=int(id_or_name)) if id_or_name.isdecimal() else None
+    row = store.one("experiment_by_id", id=int(id_or_name)) if _ID.fullmatch(id_or_name) else None
     row = row or store.one("experiment_by_name", name=id_or_name)
     if row is None:
         there = [f"{item.id} ({item.name})" for item in everything(store)]

@@ -3,27 +3,35 @@ Measuring: every (replicate, reference) pair that lacks a metric gets it.
 
 Order does not matter: a replicate is measured when its reference is complete, a new reference measures all
 that waited for it, and a metric whose formula gets a new version fills itself in. Work is done in small steps,
-so that the dispatcher can look after the renderer in between. A value that is not finite is stored as missing,
-with the reason.
+so that the dispatcher can look after the renderer in between, and only what is measured next is in memory.
+
+A value that does not exist is stored as missing, with the reason: pixels that are NaN or infinite, a picture of
+another size, a reference without halves. A file that cannot be read is logged and tried again by the next owner.
 """
 
 from __future__ import annotations
 
 import json
+import logging
 import math
 import time
 from collections import OrderedDict, deque
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from jobs.artifacts import Artifacts
 from jobs.store import Row, Store, now
 from renderer.errors import DartboardError
 from renderer.images import read_picture
-from renderer.metrics import METRICS, Reference, measure
+from renderer.metrics import METRICS, Reference, measure, nonfinite
 
-REFERENCES_KEPT = 4  # in memory; a grid works on one scene at a time
+KEPT_BYTES = 256 * 2**20  # of references in memory; a grid works on one scene at a time
+PAGE = 200  # cells that are looked through for gaps at a time, some milliseconds
 VERSIONS = json.dumps({name: metric.version for name, metric in METRICS.items()})
+
+log = logging.getLogger("dartboard")
 
 
 class Measurer:
@@ -31,68 +39,115 @@ class Measurer:
 
     def __init__(self, store: Store, artifacts: Artifacts):
         self.store, self.artifacts = store, artifacts
-        self.pending: deque[Row] = deque()
-        self.references: OrderedDict[tuple[int, int], Reference | str] = OrderedDict()
+        self.pairs: deque[Row] = deque()
+        self.searches: deque[tuple[int, int]] = deque()  # (reference, last cell that was looked at)
+        self.references: OrderedDict[tuple[int, int], Reference] = OrderedDict()
 
     def look_for_gaps(self) -> None:
         """Everything in the data directory that lacks a metric: after a start, or a new version of a formula."""
-        self.pending = deque(self.store.rows("pairs_with_gaps", versions=VERSIONS))
+        self.searches.extend((row["reference_id"], 0) for row in self.store.rows("reference_ids"))
 
     def add(self, replicate_id: int) -> None:
         """A replicate was just committed: it can be measured, or it completes a reference."""
         replicate = self.store.one("replicate_by_id", id=replicate_id)
-        assert replicate is not None
-        if replicate["role"] == "reference":
-            self.pending.extend(self.store.rows("pairs_of_reference", cell_id=replicate["cell_id"]))
-        else:
-            self.pending.extend(self.store.rows("pairs_of_replicate", replicate_id=replicate_id))
+        assert replicate is not None, f"no replicate {replicate_id}"
+        if replicate["role"] == "cell":
+            self.pairs.extend(self.store.rows("pairs_of_replicate", replicate_id=replicate_id))
+        elif self.store.value("completes_reference", cell_id=replicate["cell_id"], k=replicate["k"]):
+            self.searches.append((replicate["cell_id"], 0))
 
     def step(self, seconds: float) -> bool:
-        """Measure for about ``seconds``, at least one pair; True if some are left."""
+        """Measure for about ``seconds``, at least one pair; True if there may be more."""
         end = time.monotonic() + seconds
-        if self.pending:
+        while self.searches and not self.pairs and time.monotonic() < end:
+            self._search()
+        if self.pairs:
             with self.store.transaction():
-                while self.pending:
-                    self._measure(self.pending.popleft())
-                    if time.monotonic() >= end:
-                        break
-                self.store.insert("add_event", at=now(), what="measure", cell_id=None, experiment_id=None)
-        return bool(self.pending)
+                self._measure_until(end)
+        return bool(self.pairs or self.searches)
 
-    def _measure(self, pair: Row) -> None:
-        reference = self._reference(pair["reference_id"], pair["reference_replicates"])
-        values: dict[str, float] = {}
-        reason: str | None = None
-        if isinstance(reference, str):
-            reason = reference
-        else:
-            try:
-                values = measure(read_picture(self.artifacts.path(pair["image"])), reference)
-            except (DartboardError, ValueError) as error:
-                reason = str(error)
-        for name, metric in METRICS.items():
-            value = values.get(name, math.nan)
-            finite = math.isfinite(value)
-            self.store.run(
-                "add_metric",
-                replicate_id=pair["replicate_id"], reference_id=pair["reference_id"],
-                reference_replicates=pair["reference_replicates"], name=name, version=metric.version,
-                value=value if finite else None, reason=None if finite else reason or "the value is not finite",
-            )  # fmt: skip
+    def _search(self) -> None:
+        """One page of the cells of one reference."""
+        reference, after = self.searches.popleft()
+        rows = self.store.rows("cells_of_reference", reference_id=reference, after=after, limit=PAGE)
+        cells = [row["cell_id"] for row in rows]
+        if len(cells) == PAGE:
+            self.searches.appendleft((reference, cells[-1]))
+        self.pairs.extend(
+            self.store.rows("gaps_of_cells", reference_id=reference, cells=json.dumps(cells), versions=VERSIONS)
+        )
 
-    def _reference(self, cell_id: int, replicates: int) -> Reference | str:
-        """R1 and R2, the means of the even and the odd replicates; or why there are none."""
+    def _measure_until(self, end: float) -> None:
+        measured = set()
+        while self.pairs:
+            pair = self.pairs.popleft()
+            if self._measure(pair):
+                measured.add(pair["cell_id"])
+            if time.monotonic() >= end:
+                break
+        if measured:
+            revision = self.store.insert("add_event", at=now(), what="measure", cell_id=None, experiment_id=None)
+            for cell in measured:
+                self.store.run("touch", cell_id=cell, revision=revision)
+
+    def _measure(self, pair: Row) -> bool:
+        """All metrics of one pair; False if a file could not be read."""
+        try:
+            picture = read_picture(self.artifacts.path(pair["image"]))
+            reference = self._reference(pair["reference_id"], pair["reference_replicates"])
+        except DartboardError as error:
+            log.warning("replicate %s is not measured: %s", pair["replicate_id"], error)
+            return False
+        values, reason = values_of(picture, reference)
+        self.store.run_many(
+            "add_metric",
+            [
+                {
+                    "replicate_id": pair["replicate_id"], "reference_id": pair["reference_id"],
+                    "reference_replicates": pair["reference_replicates"], "name": name, "version": metric.version,
+                    "value": values.get(name), "reason": None if name in values else reason,
+                }
+                for name, metric in METRICS.items()
+            ],
+        )  # fmt: skip
+        return True
+
+    def _reference(self, cell_id: int, replicates: int) -> Reference:
+        """R1 and R2, the means of the even and the odd replicates. Raises ``DartboardError`` if one is unreadable."""
         key = (cell_id, replicates)
         if key not in self.references:
-            while len(self.references) >= REFERENCES_KEPT:
-                self.references.popitem(last=False)
             rows = self.store.rows("reference_images", cell_id=cell_id, replicates=replicates)
-            try:
-                pictures = [read_picture(self.artifacts.path(row["image"])) for row in rows]
-                self.references[key] = Reference(
-                    np.mean(pictures[0::2], axis=0, dtype=np.float64), np.mean(pictures[1::2], axis=0, dtype=np.float64)
-                )
-            except DartboardError as error:
-                self.references[key] = f"the reference cannot be read: {error}"
+            images = [str(row["image"]) for row in rows]
+            odd = self._mean(images[1::2]) if len(images) > 1 else None
+            self.references[key] = Reference(self._mean(images[0::2]), odd)
         self.references.move_to_end(key)
+        while len(self.references) > 1 and sum(map(_bytes, self.references.values())) > KEPT_BYTES:
+            self.references.popitem(last=False)
         return self.references[key]
+
+    def _mean(self, images: Sequence[str]) -> NDArray[np.float64]:
+        """The mean of pictures, one in memory at a time."""
+        total = read_picture(self.artifacts.path(images[0])).astype(np.float64)
+        for image in images[1:]:
+            picture = read_picture(self.artifacts.path(image))
+            if picture.shape != total.shape:
+                raise DartboardError(f"{image} has another size than {images[0]}, which belongs to the same reference")
+            total += picture
+        return total / len(images)
+
+
+def values_of(picture: NDArray[np.floating], reference: Reference) -> tuple[dict[str, float], str]:
+    """Every metric that exists, by name, and why the others do not."""
+    for name, pixels in (("picture", picture), ("reference", reference.mean)):
+        if bad := nonfinite(pixels):
+            return {}, f"{bad} pixels of the {name} are NaN or infinite"
+    try:
+        values = measure(picture, reference)
+    except ValueError as error:  # another size
+        return {}, str(error)
+    finite = {name: value for name, value in values.items() if math.isfinite(value)}
+    return finite, "the value is not finite" if len(finite) < len(values) else "the reference has no two halves"
+
+
+def _bytes(reference: Reference) -> int:
+    return reference.first.nbytes + (0 if reference.second is None else reference.second.nbytes)

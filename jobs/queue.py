@@ -13,7 +13,6 @@ finished picture is kept: it is the same picture whoever asked for it.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 from jobs.store import Store, now
@@ -144,9 +143,8 @@ def fail(store: Store, work: Work, error_class: str, message: str, log: str | No
     """
     The attempt ended without all its replicates: queued again, or failed.
 
-    ``log`` is the file with its process's last words, relative to the data directory.
-
-    Raises ``ValueError`` for an unknown class.
+    ``log`` is the file with its process's last words, relative to the data directory. Raises ``ValueError`` for an
+    unknown class.
     """
     if error_class not in RETRIED | FATAL:
         raise ValueError(f"unknown error class {error_class!r}; known: {', '.join(sorted(RETRIED | FATAL))}")
@@ -189,47 +187,37 @@ def cancel(store: Store, experiment: int) -> list[int]:
     The ids of the cells that were running for it alone: whoever renders them should kill that now.
     """
     with store.transaction():
-        cells = [row["cell_id"] for row in store.rows("open_cells", experiment_id=experiment)]
-        if store.run("set_cancelled", experiment_id=experiment, at=now()) == 0:
+        if not store.run("set_cancelled", experiment_id=experiment, at=now()):
             return []
         store.run("close_experiment", experiment_id=experiment)
-        unwanted = list(store.rows("unwanted_cells", cells=json.dumps(cells)))
-        running = [row["id"] for row in unwanted if row["state"] == "running"]
+        running = [row["id"] for row in store.rows("unwanted_running", experiment_id=experiment)]
         store.run("end_attempts", cells=json.dumps(running), at=now(), outcome="cancelled")
-        _move_all(store, [row["id"] for row in unwanted], "cancel", experiment)
+        _move_many(store, "cancel", "move_unwanted", experiment)
     return running
 
 
 def retry(store: Store, experiment: int) -> int:
-    """Want again what failed or was cancelled in an experiment; how many cells."""
-    return want(store, experiment, "retry")
-
-
-def want(store: Store, experiment: int, name: str = "want") -> int:
     """
-    Open what a live experiment misses; how many cells. Failed ones only with ``name`` "retry".
+    Want again what failed or was cancelled in an experiment; in how many places of its plan.
 
     A cell that comes back from failed is open again for every live experiment that misses some of it.
     """
     with store.transaction():
-        revived = store.run("set_cancelled", experiment_id=experiment, at=None)
-        rows = list(store.rows("missing_cells", experiment_id=experiment))
-        cells = [row["id"] for row in rows if row["state"] != "failed" or name == "retry"]
-        if not cells:
-            if revived:
-                _event(store, name, experiment=experiment)
-            return 0
-        idle = {
-            state: [row["id"] for row in rows if row["state"] == state] for state in ("failed", "cancelled", "done")
-        }
-        if name == "retry":
-            store.run("forgive", cells=json.dumps(idle["failed"]))
-            _move_all(store, idle["failed"] + idle["cancelled"], "retry", experiment)
-            _move_all(store, idle["done"], "want", experiment)
-        else:
-            _move_all(store, idle["cancelled"] + idle["done"], "want", experiment)
-        store.run("open_wanted", cells=json.dumps(cells))
-    return len(cells)
+        failed = json.dumps([row["id"] for row in store.rows("failed_cells", experiment_id=experiment)])
+        store.run("forgive", cells=failed)
+        store.run("set_cancelled", experiment_id=experiment, at=None)
+        _move_many(store, "retry", "move_missing", experiment)
+        opened = want(store, experiment)
+        store.run("open_everywhere", cells=failed)
+    return opened
+
+
+def want(store: Store, experiment: int) -> int:
+    """Make an experiment live and open what it misses, except what has failed; in how many places of its plan."""
+    with store.transaction():
+        store.run("set_cancelled", experiment_id=experiment, at=None)
+        _move_many(store, "want", "move_missing", experiment)
+        return store.run("open_experiment", experiment_id=experiment)
 
 
 def _event(store: Store, what: str, *, cell: int | None = None, experiment: int | None = None) -> int:
@@ -263,16 +251,9 @@ def _leave(store: Store, cell: int, name: str) -> str:
     return move(store, cell, name if _wanted(store, cell) else "finish")
 
 
-def _move_all(store: Store, cells: Iterable[int], name: str, experiment: int) -> None:
-    """Move many cells with one event, each from whatever state it is in. All of them, or ``MoveRefused``."""
-    ids = list(cells)
-    if not ids:
-        return
+def _move_many(store: Store, name: str, query: str, experiment: int) -> None:
+    """Move all cells that ``query`` selects of an experiment, from every state that the move leads away from."""
     revision = _event(store, name, experiment=experiment)
-    moved = sum(
-        store.run("set_states", cells=json.dumps(ids), source=source, target=target, revision=revision)
-        for (source, other), target in MOVES.items()
-        if other == name
-    )
-    if moved != len(ids):
-        raise MoveRefused(f"{len(ids) - moved} of {len(ids)} cells are in no state from which {name!r} leads anywhere")
+    for (source, other), target in MOVES.items():
+        if other == name:
+            store.run(query, experiment_id=experiment, source=source, target=target, revision=revision)

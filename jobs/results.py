@@ -20,6 +20,7 @@ from renderer.metrics import METRICS
 
 KEYS = ("experiment", "scene", "integrator", "sampler", "spp", "spp_actual", "replicate")
 TAIL = ("render_seconds", "compile_seconds", "state")
+VERSIONS = json.dumps({name: metric.version for name, metric in METRICS.items()})  # a value of another is not shown
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class Point:
     One point of a curve: the mean of a metric over n replicates.
 
     error  standard error of the mean; None for fewer than two replicates
+    sweep  (parameter, value) pairs that tell apart cells with the same labels
     """
 
     scene: str
@@ -39,40 +41,44 @@ class Point:
     n: int
     mean: float
     error: float | None
+    sweep: tuple[tuple[str, Any], ...] = ()
+
+
+def columns(store: Store, experiment: int) -> list[str]:
+    """The names of a row's values, in order: KEYS, a column per sweep, a column per metric, TAIL."""
+    return [*KEYS, *_sweeps(store, experiment), *METRICS, *TAIL]
 
 
 def rows(store: Store, experiment: int) -> Iterator[Row]:
     """
-    One row per wanted replicate: KEYS, a column per sweep, a column per metric, TAIL.
+    One row per wanted replicate, in the order of the plan, with the values that ``columns`` names.
 
-    A missing picture has its cell's state and None for every number; a missing metric is None.
+    A missing picture has its cell's state and None for every number; so has a metric that is not measured yet, or
+    that has no value (docs/storage.md says when).
     """
-    values: dict[int, dict[str, float]] = {}
-    for row in store.rows("metrics", experiment_id=experiment):
-        if METRICS.get(row["name"]) and METRICS[row["name"]].version == row["version"]:
-            values.setdefault(row["replicate_id"], {})[row["name"]] = row["value"]
-    for row in store.rows("results", experiment_id=experiment):
-        measured = values.get(row["replicate_id"], {})
-        yield (
-            {key: row[key] for key in KEYS}
-            | json.loads(row["sweep"] or "{}")
-            | {name: measured.get(name) for name in METRICS}
-            | {key: row[key] for key in TAIL}
-        )
+    nothing = dict.fromkeys(METRICS)
+    measured: dict[int, dict[str, float | None]] = {}
+    for row in store.stream("metrics", experiment_id=experiment, versions=VERSIONS):
+        measured.setdefault(row["replicate_id"], nothing.copy())[row["name"]] = row["value"]
+    sweeps = dict.fromkeys(_sweeps(store, experiment))
+    for row in store.stream("results", experiment_id=experiment):
+        head = {key: row[key] for key in KEYS}
+        if sweeps:
+            head |= sweeps | json.loads(row["sweep"] or "{}")
+        yield head | measured.get(row["replicate_id"], nothing) | {key: row[key] for key in TAIL}
 
 
 def summary(store: Store, experiment: int) -> list[Point]:
     """Mean and standard error of every metric for every cell that has values, in the order of the plan."""
     groups: dict[tuple[Any, ...], list[float]] = {}
+    sweeps = _sweeps(store, experiment)
     for row in rows(store, experiment):
+        sweep = tuple((name, row[name]) for name in sweeps if row[name] is not None)
+        cell = (row["scene"], row["integrator"], row["sampler"], row["spp"], row["spp_actual"], sweep)
         for name in METRICS:
             if row[name] is not None:
-                key = (row["scene"], row["integrator"], row["sampler"], row["spp"], row["spp_actual"], name)
-                groups.setdefault(key, []).append(row[name])
-    return [
-        Point(*key, len(found), fmean(found), stdev(found) / math.sqrt(len(found)) if len(found) > 1 else None)
-        for key, found in groups.items()
-    ]
+                groups.setdefault((*cell, name), []).append(row[name])
+    return [_point(key, found) for key, found in groups.items()]
 
 
 def write_csv(found: Iterable[Row], file: TextIO) -> None:
@@ -82,12 +88,25 @@ def write_csv(found: Iterable[Row], file: TextIO) -> None:
         if writer is None:
             writer = csv.DictWriter(file, list(row), lineterminator="\n")
             writer.writeheader()
-        writer.writerow({key: "" if value is None else value for key, value in row.items()})
+        writer.writerow(row)
     if writer is None:
         csv.writer(file, lineterminator="\n").writerow([*KEYS, *METRICS, *TAIL])
 
 
 def write_json(found: Iterable[Row], file: TextIO) -> None:
-    """A JSON list of the same rows, one a line."""
-    lines = (json.dumps(row, ensure_ascii=False) for row in found)
-    file.write("[\n" + ",\n".join(lines) + "\n]\n")
+    """A JSON list of the same rows, one a line; null for what is missing."""
+    before = "[\n"
+    for row in found:
+        file.write(before + json.dumps(row, ensure_ascii=False, allow_nan=False))
+        before = ",\n"
+    file.write("[]\n" if before == "[\n" else "\n]\n")
+
+
+def _sweeps(store: Store, experiment: int) -> list[str]:
+    return [row["name"] for row in store.rows("sweep_parameters", experiment_id=experiment)]
+
+
+def _point(key: tuple[Any, ...], found: list[float]) -> Point:
+    scene, integrator, sampler, spp, spp_actual, sweep, metric = key
+    error = stdev(found) / math.sqrt(len(found)) if len(found) > 1 else None
+    return Point(scene, integrator, sampler, spp, spp_actual, metric, len(found), fmean(found), error, sweep)

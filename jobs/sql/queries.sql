@@ -104,10 +104,6 @@ select state, crashes from cell where id = :cell_id;
 -- name: set_state
 update cell set state = :state, revision = :revision where id = :cell_id;
 
--- name: set_states
-update cell set state = :target, revision = :revision
-where id in (select value from json_each(:cells)) and state = :source;
-
 -- name: set_crashes
 update cell set crashes = :crashes where id = :cell_id;
 
@@ -161,22 +157,37 @@ update experiment set cancelled_at = :at where id = :experiment_id and (cancelle
 -- name: close_experiment
 update experiment_cell set open = 0 where experiment_id = :experiment_id and open = 1;
 
--- name: open_cells
-select distinct cell_id from experiment_cell where experiment_id = :experiment_id and open = 1;
+-- name: open_experiment
+update experiment_cell set open = 1
+where experiment_id = :experiment_id and open = 0 and had < replicates
+    and (select state from cell where id = cell_id) <> 'failed';
 
--- name: unwanted_cells
-select cell.id, cell.state from json_each(:cells) as given join cell on cell.id = given.value
-where not exists (select 1 from experiment_cell where cell_id = cell.id and open = 1);
-
--- name: missing_cells
-select distinct cell.id, cell.state
-from experiment_cell as wanted join cell on cell.id = wanted.cell_id
-where wanted.experiment_id = :experiment_id and wanted.open = 0 and wanted.had < wanted.replicates;
-
--- name: open_wanted
+-- name: open_everywhere
 update experiment_cell set open = 1
 where open = 0 and had < replicates and cell_id in (select value from json_each(:cells))
     and experiment_id in (select id from experiment where cancelled_at is null);
+
+-- name: failed_cells
+select distinct cell.id
+from experiment_cell as wanted join cell on cell.id = wanted.cell_id
+where wanted.experiment_id = :experiment_id and wanted.had < wanted.replicates and cell.state = 'failed';
+
+-- name: move_missing
+update cell set state = :target, revision = :revision
+where state = :source
+    and id in (select cell_id from experiment_cell where experiment_id = :experiment_id and had < replicates);
+
+-- name: unwanted_running
+select id from cell
+where state = 'running'
+    and id in (select cell_id from experiment_cell where experiment_id = :experiment_id and had < replicates)
+    and not exists (select 1 from experiment_cell where cell_id = cell.id and open = 1);
+
+-- name: move_unwanted
+update cell set state = :target, revision = :revision
+where state = :source
+    and id in (select cell_id from experiment_cell where experiment_id = :experiment_id and had < replicates)
+    and not exists (select 1 from experiment_cell where cell_id = cell.id and open = 1);
 
 -- name: progress
 select role, state, count(*) as cells, sum(had) as had, sum(replicates) as wanted
@@ -201,6 +212,16 @@ order by wanted.position;
 
 -- Results ----------------------------------------------------------------------------------------------------------
 
+-- name: sweep_parameters
+select distinct sweep.key as name
+from (
+    select min(cell.spec) as spec
+    from experiment_cell as wanted join cell on cell.id = wanted.cell_id
+    where wanted.experiment_id = :experiment_id and wanted.role = 'cell'
+    group by cell.estimand
+) as estimand, json_each(estimand.spec, '$.estimand.sweep') as sweep
+order by sweep.key;
+
 -- name: results
 with recursive count (k) as (
     select 0 union all
@@ -221,7 +242,7 @@ where wanted.experiment_id = :experiment_id and wanted.role = 'cell'
 order by wanted.position, count.k;
 
 -- name: metrics
-select distinct metric.replicate_id, metric.name, metric.version, metric.value
+select distinct metric.replicate_id, metric.name, metric.value
 from experiment_cell as wanted
 join experiment_cell as reference
     on reference.cell_id = wanted.reference_id and reference.experiment_id = wanted.experiment_id
@@ -231,33 +252,43 @@ join replicate
 join metric
     on metric.replicate_id = replicate.id and metric.reference_id = reference.cell_id
     and metric.reference_replicates = reference.replicates and metric.region = ''
+join json_each(:versions) as formula on formula.key = metric.name and formula.value = metric.version
 where wanted.experiment_id = :experiment_id and wanted.role = 'cell';
 
 
 -- Measuring --------------------------------------------------------------------------------------------------------
--- A pair is measurable once this experiment's own reference is complete.
 
--- name: replicate_by_id
-select id, cell_id, role, k, image from replicate where id = :id;
+-- name: reference_ids
+select distinct reference_id from experiment_cell where reference_id is not null order by reference_id;
 
--- name: pairs_with_gaps
-select distinct replicate_id, image, reference_id, reference_replicates
-from pair
-where exists (
+-- name: cells_of_reference
+select distinct cell_id from experiment_cell
+where reference_id = :reference_id and cell_id > :after
+order by cell_id limit :limit;
+
+-- name: gaps_of_cells
+select distinct replicate_id, cell_id, image, reference_id, reference_replicates
+from json_each(:cells) as given cross join pair on pair.cell_id = given.value
+where pair.reference_id = :reference_id and exists (
     select 1 from json_each(:versions) as formula
     where not exists (
         select 1 from metric
         where metric.replicate_id = pair.replicate_id and metric.reference_id = pair.reference_id
             and metric.reference_replicates = pair.reference_replicates
             and metric.name = formula.key and metric.version = formula.value and metric.region = ''))
-order by reference_id, replicate_id;
+order by replicate_id, reference_replicates;
+
+-- name: replicate_by_id
+select id, cell_id, role, k, image from replicate where id = :id;
 
 -- name: pairs_of_replicate
-select distinct replicate_id, image, reference_id, reference_replicates from pair where replicate_id = :replicate_id;
+select distinct replicate_id, cell_id, image, reference_id, reference_replicates
+from pair where replicate_id = :replicate_id;
 
--- name: pairs_of_reference
-select distinct replicate_id, image, reference_id, reference_replicates from pair where reference_id = :cell_id
-order by replicate_id;
+-- name: completes_reference
+select exists (
+    select 1 from experiment_cell
+    where cell_id = :cell_id and role = 'reference' and had = replicates and replicates > :k);
 
 -- name: reference_images
 select image from replicate where cell_id = :cell_id and role = 'reference' and k < :replicates order by k;

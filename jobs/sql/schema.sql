@@ -143,8 +143,8 @@ from experiment_cell as wanted join cell on cell.id = wanted.cell_id;
 -- A replicate and a reference that an experiment measures it against, complete as that experiment wants it.
 create view pair as
 select
-    replicate.id as replicate_id, replicate.image as image, wanted.reference_id as reference_id,
-    reference.replicates as reference_replicates
+    replicate.id as replicate_id, replicate.cell_id as cell_id, replicate.image as image,
+    wanted.reference_id as reference_id, reference.replicates as reference_replicates
 from replicate
 join experiment_cell as wanted
     on wanted.cell_id = replicate.cell_id and wanted.role = 'cell' and replicate.k < wanted.replicates
