@@ -1,9 +1,9 @@
 """
 Files of a data directory, by digest: written beside, brought to disk, then moved into place in one step.
 
-A row is committed after its file is in place, so a row without its file cannot be; a file without its row (a
-process died in between) is overwritten by the next attempt. Policy: pictures are fsynced before they are
-moved, their folders are not; docs/storage.md says what that survives.
+A row is committed after its file and the file's name are on disk, so a row without its file cannot be, not
+even after a power cut. A file without its row (a process died in between) is overwritten by the next attempt.
+docs/storage.md says what that costs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import os
 import shutil
 from pathlib import Path
 
-from jobs.errors import DataDirectoryProblem
+from jobs import disk
 
 
 class Artifacts:
@@ -32,13 +32,11 @@ class Artifacts:
 
     def prepare(self) -> None:
         """What a new owner needs: the folders, and no leftovers of its predecessor."""
-        try:
+        with disk.explained(self.data):
             for leftover in (self.work, self.previews):
                 shutil.rmtree(leftover, ignore_errors=True)
             for folder in (self.work, self.logs, self.scenes, self.previews, self.empty):
                 folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise self._problem(error) from error
 
     def picture(self, digest: str, role: str, k: int) -> str:
         """Name of a replicate's EXR: ``images/ab/<digest>/cell-000.exr``."""
@@ -63,30 +61,38 @@ class Artifacts:
         Raises ``DataDirectoryProblem`` for a disk that is full or cannot be written; the temporary file stays.
         """
         final = self.data / name
-        try:
-            descriptor = os.open(temporary, os.O_RDONLY)
-            try:
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
-            final.parent.mkdir(parents=True, exist_ok=True)
-            os.replace(temporary, final)
-        except OSError as error:
-            raise self._problem(error) from error
+        with disk.explained(self.data):
+            _sync(temporary)
+            made = _make_folder(final.parent)
+            temporary.replace(final)
+            for folder in (final.parent, *(folder.parent for folder in made)):
+                _sync(folder)  # else the name, or the folder's own, may be lost where the row is not
 
     def write_log(self, attempt: int, text: str) -> str | None:
         """Keep the log of an attempt that went wrong; its name, or None where there is nothing to keep."""
         if not text.strip():
             return None
         name = f"logs/attempt-{attempt}.log"
-        try:
+        with disk.explained(self.data):
             self.path(name).write_text(text, encoding="utf-8")
-        except OSError as error:
-            raise self._problem(error) from error
         return name
 
-    def _problem(self, error: OSError) -> DataDirectoryProblem:
-        return DataDirectoryProblem(
-            f"cannot write to the data directory {self.data}: {error.strerror}; free some space or choose another "
-            f"--data DIR, then run again: nothing that was finished is lost"
-        )
+
+def _make_folder(folder: Path) -> list[Path]:
+    """Make a folder and the missing ones above it; those that are new, innermost first."""
+    made = []
+    missing = folder
+    while not missing.exists():
+        made.append(missing)
+        missing = missing.parent
+    folder.mkdir(parents=True, exist_ok=True)
+    return made
+
+
+def _sync(path: Path) -> None:
+    """Wait until a file's content, or a folder's names, are on disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -13,14 +13,20 @@ import errno
 import fcntl
 import json
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from jobs import disk
 from jobs.errors import DataDirectoryProblem
 from jobs.store import now
 
 FILE = "owner.lock"
+TRIES = 5  # somebody who peeks holds the lock too, for some microseconds
+TRY_SECONDS = 0.02
+# Where locks or SQLite's shared memory do not hold between machines, or at all.
+REMOTE = ("nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "fuse.sshfs", "fuse.s3fs", "fuse.rclone")
 
 
 @contextlib.contextmanager
@@ -28,28 +34,22 @@ def own(data: Path, url: str | None = None) -> Iterator[None]:
     """
     Own ``data``, which is created if need be, until the block ends.
 
-    Raises ``DataDirectoryProblem`` if another process owns it or it cannot be written.
+    Raises ``DataDirectoryProblem`` if another process owns it, it cannot be written, or it is not on a local disk.
     """
-    try:
+    with disk.explained(data):
         data.mkdir(parents=True, exist_ok=True)
+        kind = file_system(data)
+        if kind in REMOTE:
+            raise DataDirectoryProblem(
+                f"{data} is on a network file system ({kind}), where a database gets damaged; choose a --data DIR "
+                f"on a local disk"
+            )
         descriptor = os.open(data / FILE, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    except OSError as error:
-        raise DataDirectoryProblem(
-            f"cannot use {data} as a data directory: {error.strerror}; make it writable or choose another --data DIR"
-        ) from error
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            raise _refused(data, error) from error
-        try:
+        _lock(descriptor, data)
+        with disk.explained(data):
             os.ftruncate(descriptor, 0)
             os.pwrite(descriptor, json.dumps({"pid": os.getpid(), "url": url, "started": now()}).encode(), 0)
-        except OSError as error:
-            raise DataDirectoryProblem(
-                f"cannot write to the data directory {data}: {error.strerror}; free some space or choose another "
-                f"--data DIR"
-            ) from error
         yield
         with contextlib.suppress(OSError):
             os.ftruncate(descriptor, 0)
@@ -75,8 +75,32 @@ def peek(data: Path) -> dict[str, Any] | None:
         os.close(descriptor)
 
 
+def file_system(folder: Path) -> str:
+    """The kind of file system that a folder is on (``ext4``), by Linux's list of mounts; "" where there is none."""
+    best, kind = -1, ""
+    with contextlib.suppress(OSError):
+        place = folder.resolve()
+        for line in Path("/proc/self/mounts").read_text(encoding="utf-8", errors="replace").splitlines():
+            fields = line.split(" ")
+            mounted = Path(fields[1].replace("\\040", " "))
+            if len(mounted.parts) >= best and place.is_relative_to(mounted):  # a later mount hides an earlier one
+                best, kind = len(mounted.parts), fields[2]
+    return kind
+
+
+def _lock(descriptor: int, data: Path) -> None:
+    for attempt in range(TRIES):
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except OSError as error:
+            if error.errno != errno.EWOULDBLOCK or attempt == TRIES - 1:
+                raise _refused(data, error) from error
+            time.sleep(TRY_SECONDS)
+
+
 def _refused(data: Path, error: OSError) -> DataDirectoryProblem:
-    if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
+    if error.errno != errno.EWOULDBLOCK:
         return DataDirectoryProblem(
             f"{data} is on a file system without locks ({error.strerror}); choose a --data DIR on a local disk"
         )
