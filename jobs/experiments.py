@@ -43,20 +43,22 @@ class Standing:
     had: int
     wanted: int
 
+    def count(self, state: str) -> int:
+        return self.cells.get(state, 0) + self.references.get(state, 0)
+
     @property
     def failed(self) -> int:
-        return self.cells.get("failed", 0) + self.references.get("failed", 0)
+        return self.count("failed")
 
     @property
     def finished(self) -> bool:
         """True if nothing is queued or running."""
-        return not any(part.get(state) for part in (self.cells, self.references) for state in ("queued", "running"))
+        return not (self.count("queued") or self.count("running"))
 
     @property
     def state(self) -> str:
         """Derived by counting: running, queued, failed, cancelled or done."""
-        counts = {state: self.cells.get(state, 0) + self.references.get(state, 0) for state in _STATES}
-        return next((state for state in _STATES if counts[state]), "done")
+        return next((state for state in _STATES if self.count(state)), "done")
 
 
 _STATES = ("running", "queued", "failed", "cancelled", "done")
