@@ -9,8 +9,10 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 
-from rich.console import Console
+from rich.console import Console, Group
+from rich.live import Live
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
+from rich.table import Column
 from rich.text import Text
 
 from jobs.dispatcher import News
@@ -28,7 +30,7 @@ class Remaining(ProgressColumn):
 
     def render(self, task: Task) -> Text:
         left = task.fields.get("seconds_left")
-        return Text("" if left is None else f"≈ {duration(left)} left", style="cyan")
+        return Text("" if left is None else f"≈ {duration(left)} left", style="cyan", no_wrap=True)
 
 
 class Follower:
@@ -46,25 +48,32 @@ class Follower:
         self.replicates, self.had = replicates, had
         self.drawn_samples = self.drawn_seconds = 0.0
         self.live = console.is_terminal
-        self.bars = Progress(
-            TextColumn("{task.description}"), BarColumn(bar_width=28), TextColumn("{task.fields[count]}"), Remaining(),
-            console=console, disable=not self.live,
+        # Two tables: one row's long name must not push the other row's numbers off a narrow terminal.
+        self.whole = Progress(
+            TextColumn("pictures"), BarColumn(bar_width=28), TextColumn("{task.fields[count]}"), Remaining(),
+            console=console,
         )  # fmt: skip
-        self.total = self.bars.add_task(
-            "pictures", total=max(replicates, 1), completed=had, count=f"{had}/{replicates}"
+        self.one = Progress(
+            BarColumn(bar_width=8),
+            TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis")),
+            console=console,
         )
-        self.now = self.bars.add_task("starting the renderer", total=1, count="")
+        self.total = self.whole.add_task("", total=max(replicates, 1), completed=had, count=f"{had}/{replicates}")
+        self.now = self.one.add_task("starting the renderer", total=None)
+        self.bars = Live(Group(self.whole, self.one), console=console, refresh_per_second=8)
 
     def __enter__(self) -> Follower:
-        self.bars.start()
-        if not self.live:
+        if self.live:
+            self.bars.start()
+        else:
             console.print(f"{self.replicates - self.had} pictures to render, {self.had} are there")
         return self
 
     def __exit__(self, *error: object) -> None:
-        self.bars.update(self.now, visible=False)
-        self.bars.update(self.total, seconds_left=None)
-        self.bars.stop()
+        if self.live:
+            self.one.update(self.now, visible=False)
+            self.whole.update(self.total, seconds_left=None)
+            self.bars.stop()
 
     def hear(self, news: News) -> None:
         """One piece of news from the dispatcher."""
@@ -72,20 +81,18 @@ class Follower:
         name = f"{scene} · {integrator} · {sampler} · {news.work.spec.spp} spp"
         match news.event:
             case Passed(role=role, k=k, done=done, passes=passes):
-                text = f"{name} · {_replicate(role, k)}"
-                self.bars.update(
-                    self.now, description=text, total=passes, completed=done, count=f"pass {done}/{passes}"
-                )
+                self._now(f"{name} · {_replicate(role, k)} · pass {done}/{passes}", done, passes)
             case Finished(role=role, k=k) as finished:
                 self._count(news, finished)
-                self.bars.update(
-                    self.now, description=f"{name} · {_replicate(role, k)}", total=1, completed=1, count=""
-                )
+                self._now(f"{name} · {_replicate(role, k)}", 1, 1)
             case Failed(error_class=error_class, message=message):
                 again = "" if news.kind == "failed" else "; it is tried again"
                 console.print(f"[red]{error_class}[/red] in {name}: {message}{again}", soft_wrap=True)
         if news.kind == "done" and not self.live:
             console.print(f"{self.had:4}/{self.replicates}  {name}{self._left()}", soft_wrap=True)
+
+    def _now(self, description: str, completed: int, total: int) -> None:
+        self.one.update(self.now, description=description, completed=completed, total=total)
 
     def _count(self, news: News, finished: Finished) -> None:
         width, height = news.work.spec.estimand.size
@@ -94,9 +101,8 @@ class Follower:
         self.samples_left = max(self.samples_left - samples, 0)
         self.drawn_samples += samples
         self.drawn_seconds += finished.render_seconds + finished.compile_seconds
-        self.bars.update(
-            self.total, completed=self.had, count=f"{self.had}/{self.replicates}", seconds_left=self.seconds_left()
-        )
+        count = f"{self.had}/{self.replicates}"
+        self.whole.update(self.total, completed=self.had, count=count, seconds_left=self.seconds_left())
 
     def seconds_left(self) -> float | None:
         """Estimate of the time still needed, None before anything was drawn."""

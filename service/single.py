@@ -10,14 +10,13 @@ from typing import Any
 
 from jobs.executors.base import Failed, Finished, Order, Passed
 from jobs.executors.local import LocalExecutor
+from jobs.gridspec import MAX_PIXELS, MAX_SIDE
 from renderer import catalog, devices
 from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, SceneError
 from renderer.scenes import sources
 from renderer.spec import CellSpec, Choice, Estimand
 from service.progress import single_bar
 from service.settings import kernel_caches
-
-MAX_SIDE = 16_384  # pixels
 
 
 def render_one(
@@ -86,12 +85,8 @@ def cell(
     width, height = _size(size) if size else (defaults.width, defaults.height)
     entry = catalog.find("integrator", how.name)
     parameters = dict(how.parameters)
-    depth = parameters.get("max_depth", max_depth if max_depth is not None else defaults.max_depth)
-    depth = entry.depth if entry.depth is not None else depth
-    if not isinstance(depth, int) or depth < -1:
-        raise BadParameter(
-            f"--max-depth {depth} is not allowed; give the edges of the longest path, or -1 for no limit"
-        )
+    depth = parameters.get("max_depth", defaults.max_depth if max_depth is None else _depth(max_depth))
+    depth = entry.depth if entry.depth is not None else int(depth)
     moved = {parameter.name for parameter in entry.parameters if parameter.estimand}
     estimand = Estimand(
         source.digest, width, height, depth, catalog.resolve("rfilter", "box"),
@@ -111,11 +106,20 @@ def _choice(axis: str, given: str | None, default: str, scene: str) -> Choice:
                          f"choose one with --{axis}: {', '.join(catalog.entries(axis))}") from error  # fmt: skip
 
 
+def _depth(given: int) -> int:
+    """``--max-depth`` by the rule that grids follow."""
+    rule = next(item for item in catalog.find("integrator", "path").parameters if item.name == "max_depth")
+    return int(rule.read(given, "--max-depth"))
+
+
 def _size(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"(\d{1,6})\s*[x×X]\s*(\d{1,6})", text)
     width, height = (int(match[1]), int(match[2])) if match else (0, 0)
-    if not 1 <= width <= MAX_SIDE or not 1 <= height <= MAX_SIDE:
-        raise BadParameter(f"--size {text!r} is not allowed; write WIDTHxHEIGHT in pixels, each from 1 to {MAX_SIDE}")
+    if not 1 <= width <= MAX_SIDE or not 1 <= height <= MAX_SIDE or width * height > MAX_PIXELS:
+        raise BadParameter(
+            f"--size {text!r} is not allowed; write WIDTHxHEIGHT in pixels, each from 1 to {MAX_SIDE} and together "
+            f"at most {MAX_PIXELS}"
+        )
     return width, height
 
 
