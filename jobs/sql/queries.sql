@@ -128,9 +128,6 @@ where id = :attempt_id and ended_at is null;
 update attempt set ended_at = :at, outcome = :outcome
 where cell_id in (select value from json_each(:cells)) and ended_at is null;
 
--- name: is_open
-select exists (select 1 from attempt where id = :attempt_id and ended_at is null);
-
 -- name: running_cells
 select id from cell where state = 'running';
 
