@@ -9,6 +9,7 @@ done in small steps between events, while the executor draws the next cell. Whoe
 
 from __future__ import annotations
 
+import itertools
 import logging
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from jobs.queue import Work
 from jobs.store import Store
 
 WAIT_SECONDS = 0.25  # longest wait for an event: also how soon a request in the inbox is seen
+ORDERS = itertools.count(1)  # a dispatcher that takes over an executor must not mistake its predecessor's orders
 MEASURE_SECONDS = 0.02  # measured at a stretch between two looks at the executor
 
 log = logging.getLogger("dartboard")
@@ -67,7 +69,6 @@ class Dispatcher:
         self.measurer = Measurer(store, artifacts)
         self.under_way: dict[int, Work] = {}  # order number → work
         self.cancelled: set[int] = set()  # orders killed because nobody wants their cell any more
-        self.orders = 0
         self.stopping = False
 
     def stop(self) -> None:
@@ -86,7 +87,8 @@ class Dispatcher:
                 return
             for event in self.executor.events(0.0 if busy else WAIT_SECONDS):
                 self._record(event)
-        for work in self.under_way.values():
+        for order, work in self.under_way.items():
+            self.executor.cancel(order)
             queue.release(self.store, work)
         self.under_way.clear()
 
@@ -96,13 +98,13 @@ class Dispatcher:
             work = queue.claim(self.store, machine=self.machine, device=self.device, experiment=self.experiment)
             if work is None:
                 return
-            self.orders += 1
+            order = next(ORDERS)
             scene = self.store.one("scene_by_digest", digest=work.spec.estimand.scene)
             assert scene is not None, "a cell's scene is a foreign key"
-            self.under_way[self.orders] = work
+            self.under_way[order] = work
             self.executor.submit(
                 Order(
-                    order=self.orders,
+                    order=order,
                     spec=work.spec.text,
                     colour=work.spec.estimand.colour,
                     scene=self.artifacts.scene_folder(work.spec.estimand.scene),

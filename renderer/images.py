@@ -72,14 +72,12 @@ def _open(path: Path, **options: bool) -> Iterator[Any]:
     if not path.is_file():
         raise DartboardError(f"no picture at {path}; give the path of an EXR file")
     try:
-        with _stdout_to_stderr():
-            file = OpenEXR.File(str(path), **options)
+        with _stdout_to_stderr(), OpenEXR.File(str(path), **options) as file:
+            yield file
+    except DartboardError:
+        raise
     except Exception as error:  # RuntimeError, ValueError or UnicodeDecodeError, by the kind of damage
-        raise DartboardError(
-            f"{path} cannot be read as OpenEXR ({type(error).__name__}); is it an EXR file?"
-        ) from error
-    with file:
-        yield file
+        raise DartboardError(f"{path} cannot be read ({type(error).__name__}); is it an EXR file?") from error
 
 
 @contextlib.contextmanager
