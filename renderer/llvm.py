@@ -1,17 +1,15 @@
 """
-LLVM: which libLLVM Dr.Jit compiles with, why that one, and how to get one.
+LLVM: which libLLVM Dr.Jit compiles with, and why that one.
 
 Dr.Jit loads a libLLVM when the first ``llvm_*`` variant is set and accepts version 15 and later. On x86-64, 15
 and 16 then *abort the process* in the first kernel (they cannot select ``fminimum``), and what a file is called
 says little about whether its own dependencies are there. So a library counts only after a child process has
 compiled with it: ``find`` lists the candidates, ``probe`` tries one, ``choose`` takes the best that passed and
-remembers it, ``environment`` is what a render process needs to use it, ``install`` gets one where there is none.
+remembers it, ``environment`` is what a render process needs to use it. How to get one: ``llvm_apt``.
 
 Scalar variants, which need no LLVM, are not offered: the pass loop draws with JIT arrays.
 
 Standard library only, and nothing of ours but the errors: the launcher imports this before `.venv` exists.
-``DARTBOARD_LLVM`` says what ``install`` may do: `system` (apt-get install, the default for root), `unpack` (the same
-package under `.llvm/`, the default for everybody else) or `off`.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ import os
 import re
 import shutil
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from glob import glob
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,7 +29,6 @@ from renderer.errors import EnvironmentProblem
 
 OLDEST = 17  # the first whose x86-64 back end selects the NaN-propagating minimum that Dr.Jit emits
 KNOWN_GOOD = range(19, 23)  # major versions that rendered; others are tried after these
-PACKAGES = ("libllvm19", "libllvm20", "libllvm21", "libllvm22", "libllvm18", "libllvm17t64", "libllvm17")
 PROBE_SECONDS = 60  # a probe takes half a second; a cold disk may take ten
 
 # The kernel cache goes to a throw-away folder: a kernel found in a cache would prove nothing.
@@ -121,7 +118,7 @@ def _in_folders(patterns: list[str], origin: str) -> list[Library]:
 def _known_to_linker() -> list[Library]:
     """What `ldconfig -p` lists: libraries in folders that only /etc/ld.so.conf names."""
     ldconfig = shutil.which("ldconfig") or "/sbin/ldconfig"
-    listing = _run([ldconfig, "-p"]).stdout if Path(ldconfig).exists() else ""
+    listing = run_tool([ldconfig, "-p"]).stdout if Path(ldconfig).exists() else ""
     folders = [os.path.dirname(path) for path in re.findall(r"^\s*libLLVM\S* .*=> (\S+)$", listing, re.M)]
     return _in_folders(list(dict.fromkeys(folders)), "system")
 
@@ -152,19 +149,19 @@ def probe(library: Library, python: str = sys.executable) -> tuple[str, str]:
         return "", "there is no such file"
     version = library.version
     if not version:
-        answer = _run([python, "-c", ASK_VERSION, str(library.path)])
+        answer = run_tool([python, "-c", ASK_VERSION, str(library.path)])
         version = answer.stdout.strip() or "older than 16"  # LLVMGetVersion came with 16
         if "OSError" in answer.stderr:
-            return "", _last_line(answer.stderr)
+            return "", last_line(answer.stderr)
     if not version[0].isdigit() or _numbers(version)[0] < OLDEST:
         return "", f"version {version} is too old, {OLDEST} or newer is needed"
-    trial = _run([python, "-c", PROBE], {**os.environ, **_variables(library.path)}, PROBE_SECONDS)
+    trial = run_tool([python, "-c", PROBE], {**os.environ, **_variables(library.path)}, PROBE_SECONDS)
     if trial.returncode == 0:
         return trial.stdout.strip(), ""
     if "No module named 'drjit'" in trial.stderr:
         raise EnvironmentProblem(f"{python} has no Dr.Jit, so no LLVM can be tried; start the program with ./dartboard")
     trouble = re.search(r"LLVM ERROR: .*|Unable to load .*", trial.stderr)
-    says = trouble[0][:200].strip() if trouble else _last_line(trial.stderr)
+    says = trouble[0][:200].strip() if trouble else last_line(trial.stderr)
     return "", f"Dr.Jit {'aborts' if trial.returncode < 0 else 'fails'} with it: {says or 'no answer in time'}"
 
 
@@ -296,113 +293,19 @@ def write_note(name: str, note: Mapping[str, Any]) -> None:
             beside.unlink()
 
 
-# ---------------------------------------------------------------------------------------------- how to get one
-
-
-def install(say: Callable[[str], None], inherit: tuple[int, ...] = ()) -> None:
-    """
-    Put a libLLVM on this machine, or raise ``EnvironmentProblem`` with the reason (``choose`` then tells the cure).
-
-    Root gets the system's package; where that fails, and for everybody else, the package is unpacked under
-    `.llvm/`, which changes nothing outside the checkout. ``inherit`` are descriptors that the commands keep
-    open: the launcher's lock, so that a killed launcher's apt-get still holds it.
-    """
-    how = os.environ.get("DARTBOARD_LLVM") or ("system" if os.geteuid() == 0 else "unpack")
-    if how not in ("system", "unpack", "off"):
-        raise EnvironmentProblem(f"unknown value {how!r} of DARTBOARD_LLVM; known: off, system, unpack")
-    if how == "off" or not shutil.which("apt-get"):
-        reason = "DARTBOARD_LLVM=off" if how == "off" else "this machine has no apt-get"
-        raise EnvironmentProblem(f"no LLVM {OLDEST} or newer is here, and none is installed: {reason}")
-    if how == "system":
-        package, trouble = _install_system(say, inherit)
-        if not trouble:
-            return
-        say(f"apt-get install {package} failed ({trouble}); unpacking it under .llvm instead")
-    fetch(PACKAGES, say, inherit)
-
-
-def _install_system(say: Callable[[str], None], inherit: tuple[int, ...]) -> tuple[str, str]:
-    for lists in ("as they are", "updated"):
-        if lists == "updated":
-            _run(["apt-get", "update"], inherit=inherit)
-        if package := _available(PACKAGES, []):
-            say(f"installing {package} with apt-get")
-            answer = _run(["apt-get", "install", "-y", "--no-install-recommends", package], inherit=inherit)
-            if answer.returncode == 0:
-                return package, ""
-    return package or PACKAGES[0], _last_line(answer.stderr) if package else "apt knows no such package"
-
-
-def fetch(packages: tuple[str, ...], say: Callable[[str], None], inherit: tuple[int, ...] = ()) -> Path:
-    """
-    Unpack the first of ``packages`` that apt knows, with the dependencies this machine lacks; no root needed.
-
-    Returns the folder, `.llvm/PACKAGE`. It appears whole or not at all: files are unpacked beside it and renamed.
-    """
-    home = state_folder()
-    home.mkdir(parents=True, exist_ok=True)
-    for leftover in home.glob("unpacking-*"):
-        shutil.rmtree(leftover, ignore_errors=True)
-    beside = home / f"unpacking-{os.getpid()}"
-    (beside / "debs").mkdir(parents=True)
-    try:
-        trouble = "apt knows no such package"
-        for options in ([], _private_lists(beside)):  # the machine's lists may be absent (containers) or stale
-            if options:
-                trouble = _last_line(_run(["apt-get", *options, "update"], inherit=inherit).stderr) or trouble
-            if package := _available(packages, options):
-                say(f"unpacking {package} under {home.name}, without root")
-                if not (trouble := _unpack(package, beside, options, inherit)):
-                    shutil.rmtree(home / package, ignore_errors=True)
-                    (beside / "root").replace(home / package)
-                    return home / package
-    finally:
-        shutil.rmtree(beside, ignore_errors=True)
-    raise EnvironmentProblem(f"could not get {packages[0]} or another of its kind: {trouble}")
-
-
-def _unpack(package: str, beside: Path, options: list[str], inherit: tuple[int, ...]) -> str:
-    """Download and unpack into ``beside``; the trouble in words, or ''."""
-    simulated = _run(["apt-get", *options, "-s", "install", "--no-install-recommends", package]).stdout
-    missing = set(re.findall(r"^Inst (\S+)", simulated, re.M)) - {"libc6"}  # a second libc cannot be mixed in
-    got = _run(["apt-get", *options, "download", *sorted({package} | missing)], cwd=beside / "debs", inherit=inherit)
-    if got.returncode:
-        return _last_line(got.stderr)
-    for deb in sorted((beside / "debs").glob("*.deb")):
-        done = _run(["dpkg-deb", "-x", str(deb), str(beside / "root")], inherit=inherit)
-        if done.returncode:
-            return _last_line(done.stderr)
-    return ""
-
-
-def _available(packages: tuple[str, ...], options: list[str]) -> str:
-    """The first of ``packages`` that apt could install, or ''."""
-    policy = _run(["apt-cache", *options, "policy", *packages]).stdout
-    candidates = dict(re.findall(r"^(\S+):\n.*\n\s+Candidate: (\S+)", policy, re.M))
-    return next((name for name in packages if candidates.get(name, "(none)") != "(none)"), "")
-
-
-def _private_lists(folder: Path) -> list[str]:
-    """apt's options for package lists of our own, which need no root; what is installed is still read from dpkg."""
-    (folder / "lists/partial").mkdir(parents=True)
-    (folder / "cache/archives/partial").mkdir(parents=True)
-    settings = {"Dir::State::Lists": folder / "lists", "Dir::Cache": folder / "cache", "APT::Sandbox::User": "root"}
-    return [word for name, value in settings.items() for word in ("-o", f"{name}={value}")]
-
-
-class _Answer(NamedTuple):
+class Answer(NamedTuple):
     returncode: int
     stdout: str
     stderr: str
 
 
-def _run(
+def run_tool(
     command: list[str],
     env: Mapping[str, str] | None = None,
     timeout: float = 900,  # seconds: 26 MB over a slow line
     cwd: Path | None = None,
     inherit: tuple[int, ...] = (),
-) -> _Answer:
+) -> Answer:
     """A child process to its end, in English, with no questions asked and no terminal."""
     import subprocess  # here, because a warm start needs no child process and this import is its largest
 
@@ -413,13 +316,13 @@ def _run(
             stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace",
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        return _Answer(124, "", "")
+        return Answer(124, "", "")
     except OSError as error:
-        return _Answer(127, "", str(error))
-    return _Answer(done.returncode, done.stdout, done.stderr)
+        return Answer(127, "", str(error))
+    return Answer(done.returncode, done.stdout, done.stderr)
 
 
-def _last_line(text: str) -> str:
+def last_line(text: str) -> str:
     """What a tool said last, without the addresses it may name."""
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("W:")]
     return re.sub(r"\s*\w+://\S+", "", lines[-1]) if lines else ""

@@ -41,7 +41,13 @@ class Checkout:
     def __init__(self, folder: Path):
         self.folder = folder
         self.wheels = folder / "wheels"
-        for name in ("dartboard", "renderer/__init__.py", "renderer/errors.py", "renderer/llvm.py"):
+        for name in (
+            "dartboard",
+            "renderer/__init__.py",
+            "renderer/errors.py",
+            "renderer/llvm.py",
+            "renderer/llvm_apt.py",
+        ):
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(HOME / name, folder / name)
         (folder / "service").mkdir()

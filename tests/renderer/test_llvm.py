@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from renderer import llvm
+from renderer import llvm, llvm_apt
 from renderer.errors import EnvironmentProblem
 
 LLVM_15 = Path("/usr/lib/x86_64-linux-gnu/libLLVM-15.so.1")
@@ -164,12 +164,12 @@ def test_unpacked_dependencies_go_on_the_library_path(own_state):
 def test_what_install_may_do_is_the_users_choice(own_state, monkeypatch):
     monkeypatch.setenv("DARTBOARD_LLVM", "off")
     with pytest.raises(EnvironmentProblem, match="DARTBOARD_LLVM=off"):
-        llvm.install(print)
+        llvm_apt.install(print)
     monkeypatch.setenv("DARTBOARD_LLVM", "perhaps")
     with pytest.raises(
         EnvironmentProblem, match="unknown value 'perhaps' of DARTBOARD_LLVM; known: off, system, unpack"
     ):
-        llvm.install(print)
+        llvm_apt.install(print)
 
 
 APT_OFFLINE = """#!/bin/sh
@@ -188,7 +188,7 @@ def test_a_fetch_without_network_says_so_and_leaves_nothing(own_state, tmp_path,
     monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
     said: list[str] = []
     with pytest.raises(EnvironmentProblem, match="Temporary failure resolving") as caught:
-        llvm.fetch(("libllvm19",), said.append)
+        llvm_apt.fetch(("libllvm19",), said.append)
     assert "mirror.example" not in str(caught.value)
     assert list(own_state.iterdir()) == []
 
@@ -197,7 +197,7 @@ def test_a_fetch_without_network_says_so_and_leaves_nothing(own_state, tmp_path,
 @pytest.mark.skipif(not Path("/usr/bin/apt-get").exists(), reason="not a Debian")
 def test_an_unpacked_package_draws(own_state, monkeypatch):
     monkeypatch.setenv("DARTBOARD_LLVM", "unpack")
-    llvm.install(print)
+    llvm_apt.install(print)
     unpacked = [one for one in llvm.find({}) if one.origin == ".llvm"]
     choice = llvm.decide(unpacked, sys.executable)
     assert choice.path.is_relative_to(own_state) and int(choice.version.split(".")[0]) >= llvm.OLDEST
