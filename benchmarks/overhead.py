@@ -28,7 +28,7 @@ from jobs.dispatcher import Dispatcher, News
 from jobs.executors.base import Order
 from jobs.executors.local import LocalExecutor
 from jobs.store import Store
-from renderer import devices
+from renderer import devices, variant
 from renderer.scenes import sources
 from renderer.spec import CellSpec, seed
 from service.settings import kernel_caches
@@ -78,7 +78,7 @@ class Bare:
         import os
 
         self.process = subprocess.Popen(
-            [sys.executable, "-m", "benchmarks.overhead", "--bare", device.variant("ad_rgb")], text=True,
+            [sys.executable, "-m", "benchmarks.overhead", "--bare", variant.name(device.name, "rgb")], text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, env={**os.environ, **device.environment},
         )  # fmt: skip
 
@@ -98,13 +98,13 @@ class Bare:
         self.process.wait()
 
 
-def serve_bare(variant: str) -> None:
+def serve_bare(name: str) -> None:
     from renderer.images import write_picture
     from renderer.render import render
     from renderer.scenes.load import load
     from renderer.variant import use
 
-    use(variant)
+    use(name)
     for line in sys.stdin:
         asked: dict[str, Any] = json.loads(line)
         start = time.perf_counter()

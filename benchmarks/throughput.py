@@ -22,6 +22,7 @@ from typing import Any
 from renderer import catalog, devices
 from renderer.scenes import sources
 from renderer.spec import CellSpec, Estimand
+from renderer.variant import name as variant_name
 
 AIM_RATIO = 0.95
 AIM_MEMORY_GIB = 3.0
@@ -93,7 +94,7 @@ def main() -> int:
     asked = parser.parse_args()
     device = devices.pick()
     os.environ.update(device.environment)
-    variant, samples = device.variant("ad_rgb"), asked.size**2 * asked.spp
+    variant, samples = variant_name(device.name, "rgb"), asked.size**2 * asked.spp
     pairs = child(compare, variant, asked.size, asked.spp, asked.runs)
     rates = [samples / statistics.median(column) / 1e6 for column in zip(*pairs, strict=True)]
     print(f"cornell_box {asked.size}×{asked.size} × {asked.spp} spp, path, on {device.description}")

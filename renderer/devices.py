@@ -5,7 +5,8 @@ A device is *usable* when a child process has drawn with it: Dr.Jit's back ends 
 and a driver that is there may still be too old. Mitsuba is not imported here. A verdict is remembered beside LLVM's
 (``renderer.llvm``), so that ``pick`` costs milliseconds from the second time on.
 
-A render process gets ``{**os.environ, **device.environment}`` as its environment and sets ``device.variant(mode)``.
+A render process gets ``{**os.environ, **device.environment}`` as its environment
+and sets ``variant.name(device.name, colour)``.
 """
 
 from __future__ import annotations
@@ -50,10 +51,6 @@ class Device:
     description: str
     why: str
     environment: dict[str, str] = field(default_factory=dict)
-
-    def variant(self, mode: str = "ad_rgb") -> str:
-        """Mitsuba's name of the variant: ``llvm_ad_rgb``, ``cuda_ad_spectral``, …"""
-        return f"{self.name}_{mode}"
 
 
 def pick(name: str = "auto") -> Device:
