@@ -96,7 +96,8 @@ def submit(store: Store, plan: Plan, scenes: Path) -> tuple[Experiment, int]:
 def find(store: Store, id_or_name: str) -> Experiment:
     """The experiment of that id, else the newest of that name. Raises ``NotFound`` with those that are there."""
     row = store.one("experiment_by_id", id=int(id_or_name)) if _ID.fullmatch(id_or_name) else None
-    row = row or store.one("experiment_by_name", name=id_or_name)
+    name = id_or_name.encode(errors="replace").decode()  # a command line may hold what is no text
+    row = row or store.one("experiment_by_name", name=name)
     if row is None:
         there = [f"{item.id} ({item.name})" for item in everything(store)]
         listed = ", ".join(there[-10:]) or "none yet"

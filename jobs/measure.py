@@ -57,10 +57,12 @@ class Measurer:
             self.searches.append((replicate["cell_id"], 0))
 
     def step(self, seconds: float) -> bool:
-        """Measure for about ``seconds``, at least one pair; True if there may be more."""
+        """Search or measure for about ``seconds``, and get on in any case; True if there may be more."""
         end = time.monotonic() + seconds
-        while self.searches and not self.pairs and time.monotonic() < end:
+        while self.searches and not self.pairs:
             self._search()
+            if time.monotonic() >= end:
+                break
         if self.pairs:
             with self.store.transaction():
                 self._measure_until(end)
