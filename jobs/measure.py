@@ -138,6 +138,14 @@ class Measurer:
         return total / len(images)
 
 
+def catch_up(store: Store, artifacts: Artifacts) -> None:
+    """Measure whatever is missing, to the end: for an owner with nothing to render."""
+    measurer = Measurer(store, artifacts)
+    measurer.look_for_gaps()
+    while measurer.step(1.0):
+        pass
+
+
 def values_of(picture: NDArray[np.floating], reference: Reference) -> tuple[dict[str, float], str]:
     """Every metric that exists, by name, and why the others do not."""
     for name, pixels in (("picture", picture), ("reference", reference.mean)):

@@ -13,7 +13,7 @@ import signal
 from pathlib import Path
 from types import FrameType
 
-from jobs import experiments, grid, owner, plan, queue, results
+from jobs import experiments, grid, measure, owner, plan, queue, results
 from jobs.artifacts import Artifacts
 from jobs.dispatcher import Dispatcher
 from jobs.executors.local import LocalExecutor
@@ -47,7 +47,9 @@ def run_grid(file: Path, data: Path, *, device: str, executor: str, as_json: boo
         experiment, _ = experiments.submit(store, planned, artifacts.scenes)
         before = experiments.standing(store, experiment.id)
         interrupted = False
-        if not before.finished:
+        if before.finished:
+            measure.catch_up(store, artifacts)  # an owner that was killed after its last picture left it unmeasured
+        else:
             interrupted = _render(store, artifacts, experiment, planned, before, chosen)
         standing = experiments.standing(store, experiment.id)
         _tell(store, experiment, before, standing, interrupted, data, as_json)

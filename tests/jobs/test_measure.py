@@ -146,6 +146,13 @@ def test_when_nothing_is_missing_nothing_is_written(store, artifacts):
     assert store.revision() == revision
 
 
+def test_an_owner_with_nothing_to_render_measures_what_its_predecessor_left(store, artifacts):
+    submit(store)
+    draw_all(store, artifacts)
+    measure.catch_up(store, artifacts)
+    assert len(numbers(store)) == 4 * len(METRICS)
+
+
 @pytest.mark.parametrize(
     ("role", "pixels", "reason"),
     [

@@ -187,9 +187,10 @@ assert [item.id for item in experiments.everything(store)] == list(range(1, repl
 def test_a_disk_that_is_really_full_is_told_and_nothing_is_half_written(tmp_path):
     """On a small file system of its own, with the rest of it taken by another file."""
     alone = ["unshare", "--user", "--map-root-user", "--mount"]
-    if not shutil.which("unshare") or subprocess.run(
-        [*alone, "mount", "-t", "tmpfs", "none", str(tmp_path)], capture_output=True
-    ).returncode:
+    if (
+        not shutil.which("unshare")
+        or subprocess.run([*alone, "mount", "-t", "tmpfs", "none", str(tmp_path)], capture_output=True).returncode
+    ):
         pytest.skip("this machine lets no user mount a small file system")
     script = 'mount -t tmpfs -o size=3m none "$1" && head -c 1m /dev/zero > "$1/other.bin" && "$2" -c "$3" "$1"'
     command = [*alone, "sh", "-c", script, "sh", str(tmp_path), sys.executable, FULL]
