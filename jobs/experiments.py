@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -74,23 +74,33 @@ def submit(store: Store, plan: Plan, scenes: Path) -> tuple[Experiment, int]:
     for request in plan.grid.scenes:
         sources.snapshot(request.source, scenes)
     with store.transaction():
-        known = store.one("experiment_by_digest", digest=plan.grid.digest)
+        known = store.value("experiment_by_digest", digest=plan.grid.digest)
         if known is not None:
-            if known["cancelled_at"]:
-                queue.want(store, known["id"])
-            return _experiment(known), 0
-        for request in plan.grid.scenes:
-            source = request.source
-            store.run("add_scene", digest=source.digest, name=source.name, main=source.main, builtin=source.builtin)
-        experiment = store.insert(
-            "add_experiment", digest=plan.grid.digest, name=plan.grid.name, created_at=now(), grid=plan.grid.text
-        )
-        revision = store.insert("add_event", at=now(), what="submit", cell_id=None, experiment_id=experiment)
+            experiment = find(store, str(known))
+            if experiment.cancelled:
+                queue.want(store, experiment.id)
+            return find(store, str(known)), 0
         before = store.value("count_cells")
-        store.run_many("add_cell", _cell_rows(plan, revision))
-        store.run_many("add_experiment_cell", _wanted_rows(plan, experiment))
-        queue.want(store, experiment)
-        return find(store, str(experiment)), store.value("count_cells") - before
+        new = _insert(store, plan)
+        queue.want(store, new)
+        return find(store, str(new)), store.value("count_cells") - before
+
+
+def _insert(store: Store, plan: Plan) -> int:
+    """Rows for a plan; the id of its experiment, which wants nothing yet."""
+    for request in plan.grid.scenes:
+        source = request.source
+        store.run("add_scene", digest=source.digest, name=source.name, main=source.main, builtin=source.builtin)
+    experiment = store.insert(
+        "add_experiment", digest=plan.grid.digest, name=plan.grid.name, created_at=now(), grid=plan.grid.text
+    )
+    revision = store.insert("add_event", at=now(), what="submit", cell_id=None, experiment_id=experiment)
+    scenes = {row["digest"]: row["id"] for row in store.rows("scenes")}
+    store.run_many("add_cell", _cell_rows(plan, revision, scenes))
+    digests = {cell.reference for cell in plan.cells} - {None}
+    references = {digest: store.value("cell_id", digest=digest) for digest in digests}
+    store.run_many("add_experiment_cell", _wanted_rows(plan, experiment, references))
+    return experiment
 
 
 def find(store: Store, id_or_name: str) -> Experiment:
@@ -134,19 +144,20 @@ def _experiment(row: dict[str, Any]) -> Experiment:
     return Experiment(row["id"], row["name"], row["digest"], row["created_at"], row["cancelled_at"] is not None)
 
 
-def _cell_rows(plan: Plan, revision: int) -> Iterator[dict[str, Any]]:
+def _cell_rows(plan: Plan, revision: int, scenes: Mapping[str, int]) -> Iterator[dict[str, Any]]:
     for planned in plan.cells:
         spec = planned.spec
         yield {
-            "digest": spec.digest, "spec": spec.text, "estimand": spec.estimand.digest, "scene": spec.estimand.scene,
-            "spp": spec.spp, "pixels": math.prod(spec.estimand.size), "revision": revision,
+            "digest": spec.digest, "spec": spec.text, "estimand": spec.estimand.digest, "spp": spec.spp,
+            "pixels": math.prod(spec.estimand.size), "scene_id": scenes[spec.estimand.scene], "revision": revision,
         }  # fmt: skip
 
 
-def _wanted_rows(plan: Plan, experiment: int) -> Iterator[dict[str, Any]]:
+def _wanted_rows(plan: Plan, experiment: int, references: Mapping[str | None, int]) -> Iterator[dict[str, Any]]:
     for position, planned in enumerate(plan.cells):
         yield {
             "experiment_id": experiment, "position": position, "digest": planned.spec.digest, "role": planned.role,
-            "replicates": planned.replicates, "reference": planned.reference, "spp_asked": planned.spp_asked,
-            "scene": planned.scene, "integrator": planned.integrator, "sampler": planned.sampler,
+            "replicates": planned.replicates, "reference_id": references.get(planned.reference),
+            "spp_asked": planned.spp_asked, "scene": planned.scene, "integrator": planned.integrator,
+            "sampler": planned.sampler,
         }  # fmt: skip

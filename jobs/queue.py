@@ -15,7 +15,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 
-from jobs.store import Store, now
+from jobs.store import Row, Store, now
 from renderer.spec import CellSpec
 
 MAX_ATTEMPTS = 3  # crashes that one cell may cause, with no replicate in between, before the grid goes on without it
@@ -78,20 +78,20 @@ def claim(store: Store, *, machine: str, device: str, experiment: int | None = N
     """
     The next cell, now running; None if nothing is left to do.
 
-    In the order of priority, experiment, plan. With ``experiment`` only what that one wants.
+    In the order of priority, experiment, plan. With ``experiment`` only what that one wants. Cells of a version that
+    renders other pictures under the same description fail here, with the way out.
     """
     with store.transaction():
-        if experiment is None:
-            row = store.one("next_cell")
-        else:
-            row = store.one("next_cell_of_experiment", experiment_id=experiment)
-        if row is None:
-            return None
-        cell = row["id"]
-        missing = _missing(store, cell, experiment)
-        move(store, cell, "claim")
-        attempt = store.insert("start_attempt", cell_id=cell, machine=machine, device=device, at=now())
-    return Work(cell, row["digest"], CellSpec.parse(row["spec"]), attempt, machine, device, missing)
+        while row := _next(store, experiment):
+            spec = CellSpec.parse(row["spec"])
+            missing = _missing(store, row["id"], experiment)
+            move(store, row["id"], "claim")
+            attempt = store.insert("start_attempt", cell_id=row["id"], machine=machine, device=device, at=now())
+            work = Work(row["id"], row["digest"], spec, attempt, machine, device, missing)
+            if spec.digest == work.digest:
+                return work
+            fail(store, work, "bad_parameter", "it was asked of an older Dartboard; submit its grid again")
+    return None
 
 
 def finish_replicate(
@@ -232,6 +232,12 @@ def _state(store: Store, cell: int) -> tuple[str, int]:
 
 def _wanted(store: Store, cell: int) -> bool:
     return bool(store.value("is_wanted", cell_id=cell))
+
+
+def _next(store: Store, experiment: int | None) -> Row | None:
+    if experiment is None:
+        return store.one("next_cell")
+    return store.one("next_cell_of_experiment", experiment_id=experiment)
 
 
 def _missing(store: Store, cell: int, experiment: int | None) -> tuple[tuple[str, int], ...]:

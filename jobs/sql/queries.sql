@@ -12,11 +12,14 @@ insert into event (at, what, cell_id, experiment_id) values (:at, :what, :cell_i
 -- name: add_scene
 insert into scene (digest, name, main, builtin) values (:digest, :name, :main, :builtin) on conflict do nothing;
 
+-- name: scenes
+select id, digest from scene;
+
 -- name: scene_by_digest
 select * from scene where digest = :digest;
 
 -- name: experiment_by_digest
-select * from experiment where digest = :digest;
+select id from experiment where digest = :digest;
 
 -- name: experiment_by_id
 select * from experiment where id = :id;
@@ -32,20 +35,24 @@ insert into experiment (digest, name, created_at, grid) values (:digest, :name, 
 
 -- name: add_cell
 insert into cell (digest, revision, scene_id, spp, pixels, estimand, spec)
-values (:digest, :revision, (select id from scene where digest = :scene), :spp, :pixels, :estimand, :spec)
+values (:digest, :revision, :scene_id, :spp, :pixels, :estimand, :spec)
 on conflict do nothing;
 
 -- name: count_cells
 select count(*) from cell;
 
+-- name: cell_id
+select id from cell where digest = :digest;
+
 -- name: add_experiment_cell
+-- Not open yet: opening all rows at once is much faster than keeping the indexes of open ones row by row.
 insert into experiment_cell (
     experiment_id, position, cell_id, role, replicates, had, reference_id, spp_asked, scene, integrator, sampler)
 select
-    :experiment_id, :position, cell.id, :role, :replicates,
+    :experiment_id, :position, id, :role, :replicates,
     (select count(*) from replicate where cell_id = cell.id and role = :role and k < :replicates),
-    (select id from cell where digest = :reference), :spp_asked, :scene, :integrator, :sampler
-from cell where cell.digest = :digest;
+    :reference_id, :spp_asked, :scene, :integrator, :sampler
+from cell where digest = :digest;
 
 -- name: replicates_had
 select cell.digest, replicate.role, count(*) as had

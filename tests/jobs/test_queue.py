@@ -164,6 +164,18 @@ def test_a_crash_after_the_last_picture_is_no_failure(store):
     assert queue.fail(store, work, "crash", "") == "done"
 
 
+def test_a_cell_of_a_version_that_rendered_otherwise_is_not_rendered_under_its_name(store, monkeypatch):
+    """Its digest promises the old pictures."""
+    old = submit(store, name="old", spp=[1, 2], reference=False)
+    monkeypatch.setattr("renderer.spec.PASS_LOOP", 99)
+    new = submit(store, name="new", spp=[2], reference=False)
+    (work,) = work_off(store)
+    assert work.spec.digest == work.digest
+    assert experiments.standing(store, new.id).state == "done"
+    assert experiments.standing(store, old.id).cells == {"failed": 2}
+    assert "submit its grid again" in store.rows("failures", experiment_id=old.id)[0]["error"]
+
+
 def test_release_and_recover_blame_nobody(store):
     submit(store, spp=[1, 2], reference=False)
     for _ in range(MAX_ATTEMPTS + 1):
