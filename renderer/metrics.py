@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ class Reference:
     first: Picture
     second: Picture | None = None
 
-    @property
+    @cached_property
     def mean(self) -> Picture:
         """mean(R1, R2) in float64, or the one picture."""
         first = self.first.astype(np.float64)
