@@ -3,8 +3,9 @@ The render process: orders come in line by line, pictures and events go out.
 
 ``python -m jobs.render_process VARIANT`` reads one JSON order a line from stdin, renders its replicates in
 turn and writes one JSON event a line to what was its stdout; everything that Mitsuba or Dr.Jit prints goes to
-stderr, the log. It never sees the database, keeps one or two scenes loaded (every live scene slows every
-kernel, science.md G13), and dies with its owner: by signal, or at the end of stdin.
+stderr, the log. It never sees the database, keeps one scene loaded (a second live one slows every kernel by
+7 %, as virtual calls trace all of them; a plan goes scene by scene), and dies with its owner: by signal, or at
+the end of stdin.
 
 An order:  {"order": 7, "spec": canonical text of the cell, "scene": folder, "main": "scene.xml",
             "replicates": [["cell", 0], …], "out": folder for pictures, "preview": path or null}
@@ -14,20 +15,19 @@ Events:    ready · started · pass · replicate (a finished picture, "file" in 
 from __future__ import annotations
 
 import ctypes
+import gc
 import json
 import os
 import platform
 import signal
 import sys
 import time
-from collections import OrderedDict
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Any
 
 PASS_EVENT_SECONDS = 0.1  # between two progress events of one replicate
 PREVIEW_SECONDS = 0.5  # between two previews, and before the first: quick cells need none
-SCENES_KEPT = 2
 
 
 def main() -> int:
@@ -53,7 +53,8 @@ class RenderProcess:
         self.variant = variant
         self.threads = dr.thread_count()
         self.versions = {name: version(name) for name in ("mitsuba", "drjit")}
-        self.scenes: OrderedDict[tuple[Any, ...], Any] = OrderedDict()
+        self.loaded: Any = None
+        self.loaded_key: tuple[Any, ...] | None = None
 
     def serve(self, orders: IO[str]) -> None:
         self.tell("ready", versions=self.versions, threads=self.threads, variant=self.variant)
@@ -114,21 +115,20 @@ class RenderProcess:
         previews.end()
 
     def load(self, folder: Path, main: str, spec: Any) -> Any:
-        """The scene as the estimand sees it, from the few that are kept."""
+        """The scene as the estimand sees it: the one that is loaded, or a new one in its place."""
         from renderer.scenes.load import load
 
         estimand = spec.estimand
         key = (str(folder), main, estimand.width, estimand.height, estimand.crop, estimand.rfilter)
-        if key in self.scenes:
-            self.scenes.move_to_end(key)
-            return self.scenes[key]
-        while len(self.scenes) >= SCENES_KEPT:
-            self.scenes.popitem(last=False)
-        self.scenes[key] = load(
-            folder, main, width=estimand.width, height=estimand.height, crop=estimand.crop,
-            rfilter=estimand.rfilter.name, rfilter_parameters=dict(estimand.rfilter.parameters),
-        )  # fmt: skip
-        return self.scenes[key]
+        if key != self.loaded_key:
+            self.loaded = self.loaded_key = None
+            gc.collect()  # gone before the next one comes, cycles included
+            self.loaded = load(
+                folder, main, width=estimand.width, height=estimand.height, crop=estimand.crop,
+                rfilter=estimand.rfilter.name, rfilter_parameters=dict(estimand.rfilter.parameters),
+            )  # fmt: skip
+            self.loaded_key = key
+        return self.loaded
 
     def tell(self, event: str, **values: Any) -> None:
         self.events.write(json.dumps({"event": event, **values}) + "\n")
