@@ -21,6 +21,7 @@ from typing import Literal
 
 from renderer import devices, llvm
 from renderer.errors import DartboardError, EnvironmentProblem
+from service.settings import kernel_caches
 
 State = Literal["ok", "warn", "bad"]
 WAL_RESET_BUG = ((3, 7, 0), (3, 51, 2))  # SQLite versions that may corrupt a WAL database with two connections
@@ -206,11 +207,12 @@ def _owner(data: Path) -> str:
 
 
 def _kernel_cache() -> Line:
-    """Dr.Jit's compiled kernels: without a place to keep them every start compiles all of them again."""
-    folder = Path(os.environ.get("DRJIT_CACHE_DIR") or Path.home() / ".drjit")
+    """Compiled kernels: without a common place to keep them every data directory compiles all of them again."""
+    folder = kernel_caches()
     if not os.access(_nearest(folder), os.W_OK | os.X_OK):
-        return Line("kernel cache", "warn", f"{folder} is not writable", "set DRJIT_CACHE_DIR to a folder that is")
-    files = [file for file in folder.glob("*") if file.is_file()] if folder.is_dir() else []
+        told = f"{folder} is not writable: every data directory keeps its own"
+        return Line("kernel cache", "warn", told, "set XDG_CACHE_HOME to a folder that is writable")
+    files = [file for file in folder.rglob("*.bin") if file.is_file()] if folder.is_dir() else []
     megabytes = sum(file.stat().st_size for file in files) / 2**20
     return Line("kernel cache", "ok", f"{folder}: {len(files)} files, {megabytes:.1f} MiB")
 

@@ -22,7 +22,7 @@ from jobs.store import Store
 from renderer import devices
 from renderer.errors import UnknownName
 from service.progress import Follower, console
-from service.settings import kernel_caches
+from service.settings import usable_kernel_caches
 from service.tables import show_errors, show_failures
 
 EXECUTORS = ("local",)  # "ray" comes with the extra of that name
@@ -63,7 +63,9 @@ def _render(
 ) -> bool:  # fmt: skip
     """Work until nothing is left; True if a signal ended it."""
     console.print(f"{experiment.name} (experiment {experiment.id}) on {device.description}")
-    local = LocalExecutor(device, kernels=kernel_caches(), logs=artifacts.logs, cwd=artifacts.empty)
+    local = LocalExecutor(
+        device, kernels=usable_kernel_caches(artifacts.data), logs=artifacts.logs, cwd=artifacts.empty
+    )
     follower = Follower(planned, store.value("samples_left", experiment_id=experiment.id) or 0, before)
     dispatcher = Dispatcher(
         store, artifacts, local, machine=platform.node(), device=device.name, experiment=experiment.id,

@@ -19,3 +19,13 @@ def kernel_caches() -> Path:
     a second experiment starts warm. In XDG_CACHE_HOME, else in ``~/.cache``.
     """
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "dartboard" / "kernels"
+
+
+def usable_kernel_caches(otherwise: Path) -> Path:
+    """``kernel_caches``, made if need be; a folder in ``otherwise`` for a user whose home cannot be written."""
+    folder = kernel_caches()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return otherwise / "kernels"
+    return folder if os.access(folder, os.W_OK | os.X_OK) else otherwise / "kernels"

@@ -16,7 +16,7 @@ from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, Sc
 from renderer.scenes import sources
 from renderer.spec import CellSpec, Choice, Estimand
 from service.progress import single_bar
-from service.settings import kernel_caches
+from service.settings import usable_kernel_caches
 
 
 def render_one(
@@ -51,7 +51,9 @@ def render_one(
             order=1, spec=spec.text, colour="rgb", scene=snapshot, main=source.main,
             trust="builtin" if source.builtin else source.digest, replicates=(("cell", seed),), out=out / "work",
         )  # fmt: skip
-        executor = LocalExecutor(devices.pick(device), kernels=kernel_caches(), logs=out / "logs", cwd=out / "empty")
+        executor = LocalExecutor(
+            devices.pick(device), kernels=usable_kernel_caches(out), logs=out / "logs", cwd=out / "empty"
+        )
         try:
             finished = _draw(executor, order)
         finally:

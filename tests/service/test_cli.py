@@ -150,3 +150,13 @@ def test_check_says_what_it_would_render(tmp_path: Path) -> None:
     assert (told["cells"], told["references"], told["replicates"], told["reused"]) == (1, 1, 5, 0)
     assert {"sampler": "ldsampler", "asked": 5, "rendered": 16} in told["rounded"]
     assert not (tmp_path / "none").exists()
+
+
+def test_a_home_that_cannot_be_written_costs_only_the_shared_cache(tmp_path: Path) -> None:
+    """The kernels then lie in the data directory, and the run is none the worse."""
+    (tmp_path / "grid.toml").write_text(TINY)
+    (tmp_path / "no-folder").write_text("")
+    environment = {"XDG_CACHE_HOME": str(tmp_path / "no-folder" / "cache")}
+    done = dartboard("run", tmp_path / "grid.toml", "--data", tmp_path / "data", **environment)
+    assert done.returncode == 0, done.stderr
+    assert list((tmp_path / "data" / "kernels" / "builtin").glob("*.bin"))
