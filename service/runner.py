@@ -106,7 +106,9 @@ def _tell(
     if interrupted:
         console.print(f"stopped: {standing.had} of {standing.wanted} pictures are there; run it again to go on")
         return
-    if standing.had == before.had and not standing.failed:
+    if standing.state == "cancelled":
+        console.print(f"cancelled: {standing.had} of {standing.wanted} pictures are there; `dartboard retry` goes on")
+    elif standing.had == before.had and standing.state == "done":
         console.print(f"nothing to do: all {standing.had} pictures of {experiment.name!r} are there")
     show_errors(results.summary(store, experiment.id))
     show_failures(list(store.rows("failures", experiment_id=experiment.id)), data)

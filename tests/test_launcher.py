@@ -315,7 +315,6 @@ def entries(lock: Path) -> dict[str, frozenset[str]]:
 
 
 @pytest.mark.slow  # the network: 100 MB
-@pytest.mark.skipif(not (HOME / "service/cli.py").exists(), reason="the command line is not there")
 def test_a_real_first_start_prepares_a_device(checkout):
     """This checkout's lock, an empty HOME, and no LLVM but what the machine or its packages give."""
     for name in ("requirements.lock", "pyproject.toml"):

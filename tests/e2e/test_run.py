@@ -156,7 +156,7 @@ def test_a_grid_becomes_falling_errors(grid: Path, data: Path) -> None:
     picture = next(data.glob("images/*/*/cell-000.exr"))
     header = read_header(picture)
     spec = json.loads(header["spec"])
-    assert spec["estimand"]["width"], spec["estimand"]["height"] == (24, 16)
+    assert (spec["estimand"]["width"], spec["estimand"]["height"]) == (24, 16)
     assert read_picture(picture).shape == (16, 24, 3)
     assert header["digest"] == picture.parent.name
     assert set(json.loads(header["versions"])) == {"mitsuba", "drjit"}
