@@ -1,0 +1,57 @@
+// @ts-check
+/** The keyboard help: what every registered shortcut does, and those of the viewer where it is not open. */
+import { html } from "../vendor/preact-htm.js";
+import { registered } from "../keys.js";
+import { Dialog } from "../parts/dialog.js";
+import { Icon } from "../parts/icons.js";
+
+/** @typedef {import("../keys.js").Shortcut} Shortcut */
+
+/** The keys of the viewer are a convention of the whole tool (tev and its kin), so they can be looked up anywhere. */
+const VIEWER = "Viewer";
+/** @type {readonly Shortcut[]} */
+const VIEWER_KEYS = [
+  { shown: "1 … 9", does: "picture n of the row" },
+  { shown: "Shift", does: "the reference while held, back on release" },
+  { shown: "← → ↑ ↓", does: "along the columns and the rows of the grid" },
+  { shown: "e / Shift+e", does: "half a stop brighter, darker" },
+  { shown: "r", does: "exposure back to 0" },
+  { shown: "n", does: "normalise" },
+  { shown: "f / Shift+f", does: "maximum of the false colours up, down" },
+  { shown: "t", does: "next tone map: sRGB, gamma 2.2, false colour, signed" },
+  { shown: "wheel, drag", does: "zoom at the cursor, pan" },
+];
+
+/** @param {{onClose: () => void}} props */
+export function Help({ onClose }) {
+  const groups = registered().map(({ title, shortcuts }) => ({ title, shortcuts }));
+  if (!groups.some(({ title }) => title === VIEWER)) groups.push({ title: VIEWER, shortcuts: VIEWER_KEYS });
+  return html`<${Dialog} title="Keyboard shortcuts" onClose=${onClose} wide>
+    <button class="button quiet icon dialog-close" aria-label="Close" onClick=${onClose}><${Icon} name="close" /></button>
+    <div class="shortcuts">
+      ${groups.map(
+        ({ title, shortcuts }) => html`<section key=${title}>
+          <h3>${title}</h3>
+          ${title === VIEWER && html`<p class="hint">These act while a picture has the focus.</p>`}
+          <dl>
+            ${shortcuts.map((shortcut) => html`<div key=${shortcut.does}><dt>${written(shortcut)}</dt><dd>${shortcut.does}</dd></div>`)}
+          </dl>
+        </section>`,
+      )}
+    </div>
+    <p class="hint">Shortcuts rest while you type.</p>
+  <//>`;
+}
+
+/** @type {Record<string, string>} */
+const NAMES = { ArrowLeft: "←", ArrowRight: "→", ArrowUp: "↑", ArrowDown: "↓", Escape: "Esc", " ": "Space" };
+
+/** Keys as caps, with what joins them as plain text. @param {Shortcut} shortcut */
+function written({ keys, shown }) {
+  const text = shown ?? [keys ?? []].flat().join(" / ");
+  return text.split(/( \/ | … |, )/).map((part) => {
+    if (/^( \/ | … |, )$/.test(part)) return html`<span class="muted">${part}</span>`;
+    if (/^[a-z]{2,}$/.test(part)) return html`<span>${part}</span>`;
+    return part.split(/[+ ]/).map((key, index) => [index > 0 && "\u200a", html`<kbd>${NAMES[key] ?? key}</kbd>`]);
+  });
+}
