@@ -18,6 +18,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -142,7 +143,7 @@ def main() -> int:
     device = devices.pick()
     with tempfile.TemporaryDirectory() as name:
         root = Path(name)
-        planned = plan.expand(grids.parse(GRID, base=root, origin="benchmark"))
+        planned = plan.expand(grids.parse(GRID, find=partial(sources.find, base=root), origin="benchmark"))
         assert len({cell.spec.digest for cell in planned.cells}) == 48
         (root / "first").mkdir()
         local = LocalExecutor(device, kernels=kernel_caches(), logs=root / "logs", cwd=root / "empty")

@@ -44,7 +44,7 @@ class Artifacts:
 
     def preview(self, digest: str) -> Path:
         """Path of the small picture that refines while a cell renders."""
-        return self.previews / f"{digest}.png"
+        return self.previews / f"{digest}.npy"
 
     def scene_folder(self, digest: str) -> Path:
         """Path of a scene's snapshot."""

@@ -1,7 +1,8 @@
 """
 The dispatcher: the one loop that claims cells, hands them to an executor and records what comes back.
 
-It runs in the owner of the data directory, in one thread. A finished picture is moved into place and its row
+It runs in the owner of the data directory, in one thread, and all that changes the database happens there: other
+threads hand in a task (``ask``). A finished picture is moved into place and its row
 committed before the loop looks at anything else, so whatever dies next, that replicate stays. Measuring is
 done in small steps between events, while the executor draws the next cell. Whoever follows a run listens to
 ``on_news`` and never touches the queue.
@@ -11,11 +12,13 @@ from __future__ import annotations
 
 import itertools
 import logging
+import queue as queues
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from jobs import inbox, queue
+from jobs import inbox, points, queue
 from jobs.artifacts import Artifacts
 from jobs.executors.base import Done, Event, Executor, Failed, Finished, Order, Passed, Released, Started
 from jobs.measure import Measurer
@@ -23,6 +26,8 @@ from jobs.queue import Work
 from jobs.store import Store
 
 WAIT_SECONDS = 0.25  # longest wait for an event: also how soon a request in the inbox is seen
+IDLE_WAIT_SECONDS = 2.0  # the same with nothing to do: a server that sleeps
+REST_SECONDS = 60.0  # idle for so long, and the render process is ended: it holds some 200 MB
 ORDERS = itertools.count(1)  # a dispatcher that takes over an executor must not mistake its predecessor's orders
 MEASURE_SECONDS = 0.02  # measured at a stretch between two looks at the executor
 
@@ -47,9 +52,10 @@ class News:
 
 class Dispatcher:
     """
-    Works for one experiment, or for all of them (``experiment`` None), until nothing is left to do.
+    Works for one experiment, or for all of them (``experiment`` None), until nothing is left to do, or with
+    ``forever`` until it is stopped.
 
-    ``stop`` may be called from a signal handler. Errors of the data directory (full, gone) end ``run`` with
+    ``on_news`` hears what happens to cells, ``on_turn`` is called between two events. ``stop`` may be called from a signal handler. Errors of the data directory (full, gone) end ``run`` with
     ``DataDirectoryProblem``: what was committed stays, the rest is rendered by the next owner.
     """
 
@@ -62,11 +68,15 @@ class Dispatcher:
         machine: str,
         device: str,
         experiment: int | None = None,
+        forever: bool = False,
         on_news: Callable[[News], None] = lambda news: None,
+        on_turn: Callable[[], None] = lambda: None,
     ):
         self.store, self.artifacts, self.executor = store, artifacts, executor
         self.machine, self.device, self.experiment, self.on_news = machine, device, experiment, on_news
+        self.forever, self.on_turn = forever, on_turn
         self.measurer = Measurer(store, artifacts)
+        self.tasks: queues.SimpleQueue[Callable[[], None]] = queues.SimpleQueue()
         self.under_way: dict[int, Work] = {}  # order number → work
         self.cancelled: set[int] = set()  # orders killed because nobody wants their cell any more
         self.stopping = False
@@ -76,21 +86,55 @@ class Dispatcher:
         self.stopping = True
         self.executor.wake()
 
+    def ask(self, task: Callable[[], None]) -> None:
+        """Have ``task`` done between two events, by the thread that may write; returns at once. From any thread."""
+        self.tasks.put(task)
+        self.executor.wake()
+
     def run(self) -> None:
         """Claim, render, record and measure until nothing is left or ``stop`` is called."""
         self.measurer.look_for_gaps()
+        idle_since: float | None = None
         while not self.stopping:
             self._answer_requests()
             self._fill()
             busy = self.measurer.step(MEASURE_SECONDS)
-            if not self.under_way and not busy:
+            self.on_turn()
+            idle = not self.under_way and not busy
+            if not idle:
+                idle_since = None
+            elif not self.forever:
                 return
-            for event in self.executor.events(0.0 if busy else WAIT_SECONDS):
+            elif idle_since is None:
+                idle_since = time.monotonic()
+            elif time.monotonic() - idle_since > REST_SECONDS:
+                self.executor.rest()
+            for event in self.executor.events(0.0 if busy else IDLE_WAIT_SECONDS if idle else WAIT_SECONDS):
                 self._record(event)
         for order, work in self.under_way.items():
             self.executor.cancel(order)
             queue.release(self.store, work)
         self.under_way.clear()
+
+    def cancel(self, experiment: int) -> None:
+        """Stop an experiment for good (until retry), and what is drawn for it alone at once."""
+        self._drop(queue.cancel(self.store, experiment))
+
+    def pause(self, experiment: int) -> None:
+        """Stop an experiment for a while."""
+        self._drop(queue.pause(self.store, experiment))
+
+    def delete(self, experiment: int) -> None:
+        """Put an experiment into the trash."""
+        self._drop(queue.delete(self.store, experiment))
+
+    def _drop(self, cells: list[int]) -> None:
+        """Kill what draws these cells: nobody wants them any more."""
+        unwanted = set(cells)
+        for order, work in list(self.under_way.items()):
+            if work.cell_id in unwanted:
+                self.cancelled.add(order)
+                self.executor.cancel(order)
 
     def _fill(self) -> None:
         """Give the executor as much as it takes."""
@@ -154,21 +198,29 @@ class Dispatcher:
             self.store, work, event.role, event.k, image=image, seed=event.seed, render_seconds=event.render_seconds,
             compile_seconds=event.compile_seconds, threads=event.threads, neighbours=event.neighbours,
         )  # fmt: skip
+        points.refresh(self.store, [work.cell_id])
         self.measurer.add(replicate)
 
     def _answer_requests(self) -> None:
-        """What `dartboard cancel` and `retry` asked of the owner."""
+        """What other threads asked, and what commands left in the inbox."""
+        while True:
+            try:
+                task = self.tasks.get_nowait()
+            except queues.Empty:
+                break
+            task()
         for request in inbox.take(self.artifacts.data):
             self._answer(request)
 
     def _answer(self, request: dict[str, Any]) -> None:
-        if request["do"] == "retry":
-            queue.retry(self.store, request["experiment"])
-        elif request["do"] == "cancel":
-            unwanted = set(queue.cancel(self.store, request["experiment"]))
-            for order, work in list(self.under_way.items()):
-                if work.cell_id in unwanted:
-                    self.cancelled.add(order)
-                    self.executor.cancel(order)
-        else:
-            log.warning("the inbox holds a request that this version does not know: %s", request["do"])
+        match request["do"], request["experiment"]:
+            case "cancel", experiment:
+                self.cancel(experiment)
+            case "pause", experiment:
+                self.pause(experiment)
+            case "resume", experiment:
+                queue.resume(self.store, experiment)
+            case "retry", experiment:
+                queue.retry(self.store, experiment)
+            case what, _:
+                log.warning("the inbox holds a request that this version does not know: %s", what)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from renderer.errors import DartboardError, EnvironmentProblem
+from renderer.errors import DartboardError, EnvironmentProblem, shown
 
 
 class GridError(DartboardError):
@@ -21,6 +21,30 @@ class GridError(DartboardError):
 
 class NotFound(DartboardError):
     """An experiment that the data directory does not know."""
+
+
+class WasDeleted(NotFound):
+    """An experiment in the trash: it can be restored for some minutes."""
+
+    def __init__(self, experiment: int, name: str):
+        self.experiment = experiment
+        short = name if len(name) <= 60 else name[:57] + "…"
+        super().__init__(
+            f"experiment {experiment} ({short}) was deleted; restore it within ten minutes to see it again"
+        )
+
+
+class Conflict(DartboardError):
+    """A request that does not fit the state of things."""
+
+
+class KeyReused(Conflict):
+    """An Idempotency-Key that came with another grid before."""
+
+    def __init__(self, key: str):
+        super().__init__(
+            f"the Idempotency-Key {shown(key)} came with another grid before; send a new key for a new grid"
+        )
 
 
 class DataDirectoryProblem(EnvironmentProblem):

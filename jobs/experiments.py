@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jobs import queue
-from jobs.errors import NotFound
+from jobs import points, queue
+from jobs.errors import KeyReused, NotFound, WasDeleted
 from jobs.plan import Plan, Role
 from jobs.store import Store, now
 from renderer.scenes import sources
@@ -25,13 +25,21 @@ _ID = re.compile(r"[0-9]{1,18}")  # what SQLite can hold
 
 @dataclass(frozen=True)
 class Experiment:
-    """A submitted grid. ``created_at`` is UTC, ISO 8601."""
+    """
+    A submitted grid. Times are UTC, ISO 8601.
+
+    grid        canonical JSON (jobs/gridspec.py)
+    deleted_at  None, or when it was put into the trash
+    """
 
     id: int
     name: str
     digest: str
     created_at: str
     cancelled: bool
+    paused: bool
+    grid: str
+    deleted_at: str | None = None
 
 
 @dataclass(frozen=True)
@@ -57,33 +65,43 @@ class Standing:
 
     @property
     def state(self) -> str:
-        """Derived by counting: running, queued, failed, cancelled or done."""
+        """Derived by counting: running, queued, paused, failed, cancelled or done."""
         return next((state for state in _STATES if self.count(state)), "done")
 
 
-_STATES = ("running", "queued", "failed", "cancelled", "done")
+_STATES = ("running", "queued", "paused", "failed", "cancelled", "done")
 
 
-def submit(store: Store, plan: Plan, scenes: Path) -> tuple[Experiment, int]:
+def submit(store: Store, plan: Plan, scenes: Path, key: str | None = None) -> tuple[Experiment, int]:
     """
-    Record a plan → (its experiment, how many cells are new). Submitting it again changes nothing, but a
-    cancelled experiment is wanted again.
+    Record a plan → (its experiment, how many cells are new). Submitting it again changes nothing, but an
+    experiment that was cancelled, paused or deleted is wanted again.
 
     scenes  folder for the snapshots: a cell never renders a file that its author may still edit
+    key     of a client that may send the same request twice: the second changes nothing at all. Raises
+            ``KeyReused`` if the key came with another grid
     """
     for request in plan.grid.scenes:
         sources.snapshot(request.source, scenes)
     with store.transaction():
+        if key is not None and (sent := store.one("submission", key=key)):
+            if sent["digest"] != plan.grid.digest:
+                raise KeyReused(key)
+            return get(store, sent["experiment_id"]), 0
         known = store.value("experiment_by_digest", digest=plan.grid.digest)
         if known is not None:
-            experiment = find(store, str(known))
-            if experiment.cancelled:
+            experiment, cells = _experiment_of(store, known), 0
+            if experiment.cancelled or experiment.paused or experiment.deleted_at:
                 queue.want(store, experiment.id)
-            return find(store, str(known)), 0
-        before = store.value("count_cells")
-        new = _insert(store, plan)
-        queue.want(store, new)
-        return find(store, str(new)), store.value("count_cells") - before
+        else:
+            before = store.value("count_cells")
+            known = _insert(store, plan)
+            queue.want(store, known)
+            points.refresh_experiment(store, known)
+            cells = store.value("count_cells") - before
+        if key is not None:
+            store.run("add_submission", key=key, digest=plan.grid.digest, experiment_id=known, at=now())
+        return get(store, known), cells
 
 
 def _insert(store: Store, plan: Plan) -> int:
@@ -104,15 +122,25 @@ def _insert(store: Store, plan: Plan) -> int:
 
 
 def find(store: Store, id_or_name: str) -> Experiment:
-    """The experiment of that id, else the newest of that name. Raises ``NotFound`` with those that are there."""
-    row = store.one("experiment_by_id", id=int(id_or_name)) if _ID.fullmatch(id_or_name) else None
+    """
+    The experiment of that id, else the newest of that name. Raises ``NotFound`` with those that are there,
+    ``WasDeleted`` for one in the trash.
+    """
+    if _ID.fullmatch(id_or_name) and store.one("experiment_by_id", id=int(id_or_name)):
+        return get(store, int(id_or_name))
     name = id_or_name.encode(errors="replace").decode()  # a command line may hold what is no text
-    row = row or store.one("experiment_by_name", name=name)
+    row = store.one("experiment_by_name", name=name)
     if row is None:
-        there = [f"{item.id} ({item.name})" for item in everything(store)]
-        listed = ", ".join(there[-10:]) or "none yet"
-        raise NotFound(f"no experiment {id_or_name!r} in {store.path.parent}; there are: {listed}")
+        raise _unknown(store, id_or_name)
     return _experiment(row)
+
+
+def get(store: Store, experiment: int) -> Experiment:
+    """The experiment of that id. Raises ``NotFound``, or ``WasDeleted`` for one in the trash."""
+    found = _experiment_of(store, experiment)
+    if found.deleted_at is not None:
+        raise WasDeleted(found.id, found.name)
+    return found
 
 
 def everything(store: Store) -> list[Experiment]:
@@ -140,8 +168,30 @@ def rates(store: Store, machine: str) -> dict[tuple[str, str], float]:
     return {(row["scene"], row["integrator"]): row["rate"] for row in store.rows("rates", machine=machine)}
 
 
+def _experiment_of(store: Store, experiment: int) -> Experiment:
+    """Of that id, in the trash or not."""
+    row = store.one("experiment_by_id", id=experiment)
+    if row is None:
+        raise _unknown(store, str(experiment))
+    return _experiment(row)
+
+
+def _unknown(store: Store, id_or_name: str) -> NotFound:
+    there = [f"{item.id} ({shown_name(item.name)})" for item in everything(store)]
+    listed = ", ".join(there[-10:]) or "none yet"
+    return NotFound(f"no experiment {id_or_name[:80]!r} in {store.path.parent}; there are: {listed}")
+
+
+def shown_name(name: str) -> str:
+    """A name as a sentence repeats it."""
+    return name if len(name) <= 60 else name[:57] + "…"
+
+
 def _experiment(row: dict[str, Any]) -> Experiment:
-    return Experiment(row["id"], row["name"], row["digest"], row["created_at"], row["cancelled_at"] is not None)
+    return Experiment(
+        row["id"], row["name"], row["digest"], row["created_at"], cancelled=row["cancelled_at"] is not None,
+        paused=row["paused_at"] is not None, grid=row["grid"], deleted_at=row["deleted_at"],
+    )  # fmt: skip
 
 
 def _cell_rows(plan: Plan, revision: int, scenes: Mapping[str, int]) -> Iterator[dict[str, Any]]:

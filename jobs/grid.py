@@ -32,10 +32,11 @@ from typing import Any
 
 from jobs.errors import GridError
 from jobs.fields import Problems, Table, choice
-from jobs.gridscenes import scenes_of
+from jobs.gridscenes import Finder, scenes_of
 from jobs.gridspec import MAX_CELLS, MAX_REPLICATES, GridSpec, ReferenceRequest, SceneRequest
 from renderer import catalog
 from renderer.errors import UnknownName, shown
+from renderer.scenes import sources
 from renderer.spec import Choice
 
 __all__ = ["GridSpec", "ReferenceRequest", "SceneRequest", "parse", "read"]
@@ -69,23 +70,28 @@ def read(path: Path) -> GridSpec:
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
         raise GridError([f"{path} is not UTF-8 text (line {line}); save it as UTF-8"]) from None
+    data = loads(text, str(path))
+    return parse(data, find=partial(sources.find, base=path.parent), origin=path.name)
+
+
+def loads(text: str, origin: str) -> dict[str, Any]:
+    """The tables in the text of a grid file. Raises ``GridError`` for what is no TOML."""
     if not text.strip():
-        raise GridError([f'{path} is empty; a grid needs at least scenes = ["cornell_box"]; {EXAMPLE}'])
+        raise GridError([f'{origin} is empty; a grid needs at least scenes = ["cornell_box"]; {EXAMPLE}'])
     try:
-        data = tomllib.loads(text)
+        return tomllib.loads(text)
     except RecursionError:
-        raise GridError([f"{path} is not a grid: its lists are nested too deeply; {EXAMPLE}"]) from None
+        raise GridError([f"{origin} is not a grid: its lists are nested too deeply; {EXAMPLE}"]) from None
     except ValueError as error:  # TOMLDecodeError says "Reason (at line 3, column 5)"
         reason, _, place = str(error).removesuffix(")").partition(" (at ")
         where = f" at {place}" if place else ""
-        raise GridError([f"{path} is not TOML{where}: {reason}; correct it there; {EXAMPLE}"]) from None
-    return parse(data, base=path.parent, origin=path.name)
+        raise GridError([f"{origin} is not TOML{where}: {reason}; correct it there; {EXAMPLE}"]) from None
 
 
-def parse(data: Mapping[str, Any], *, base: Path, origin: str) -> GridSpec:
+def parse(data: Mapping[str, Any], *, find: Finder, origin: str) -> GridSpec:
     """
-    The grid in parsed TOML or JSON. ``base`` is the folder that scene paths are relative to, ``origin`` is what
-    sentences call the request ("grid.toml"). Raises ``GridError`` with every problem found.
+    The grid in parsed TOML or JSON. ``find`` gives the scene of a name, ``origin`` is what sentences call the request
+    ("grid.toml"). Raises ``GridError`` with every problem found.
     """
     problems = Problems()
     if not isinstance(data, Mapping):
@@ -101,7 +107,7 @@ def parse(data: Mapping[str, Any], *, base: Path, origin: str) -> GridSpec:
     name, colour, replicates = _name(grid), _colour(grid), grid.integer("replicates", 1, MAX_REPLICATES)
     names = _scene_names(grid)
     _check_count(grid, {"scenes": names, "integrators": integrators, "samplers": samplers, "spp": spp})
-    scenes = scenes_of(grid, names, integrators, base)
+    scenes = scenes_of(grid, names, integrators, find)
     problems.raise_any()
     assert name and rfilter and colour, "what could not be read is a problem"
     return GridSpec(

@@ -7,7 +7,7 @@ nearest one counts, for a reference field by field. The checks that need a scene
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,19 +19,22 @@ from renderer.errors import DartboardError, UnknownName, shown
 from renderer.scenes import sources
 from renderer.spec import Choice
 
+Finder = Callable[[str], sources.SceneSource]  # raises DartboardError for what is no scene
+
 SCENE_KEYS = ("resolution", "crop", "max_depth", "reference")
 REFERENCE_KEYS = ("integrator", "sampler", "spp", "replicates")
 
 
-def scenes_of(grid: Table, names: Mapping[str, str], integrators: Sequence[Choice], base: Path) -> list[SceneRequest]:
+def scenes_of(grid: Table, names: Mapping[str, str], integrators: Sequence[Choice], find: Finder) -> list[SceneRequest]:
     """
-    The scenes of a grid with their settings. ``names`` gives each scene as written and its place in sentences.
+    The scenes of a grid with their settings. ``names`` gives each scene as written and its place in sentences, ``find``
+    the scene itself.
 
     What is wrong is noted in the grid's problems; a scene that cannot be found is left out.
     """
     common = _Settings.of(grid, f"[reference] of {grid.where}")
     own = _own_settings(grid, names)
-    scenes = [_scene(name, place, base, own.get(name), common) for name, place in names.items()]
+    scenes = [_scene(name, place, find, own.get(name), common) for name, place in names.items()]
     found = [scene for scene in scenes if scene]
     _check_references(grid, found, integrators)
     _check_twins(grid, found)
@@ -91,11 +94,11 @@ def _own_settings(grid: Table, names: Iterable[str]) -> dict[str, _Settings]:
     return found
 
 
-def _scene(name: str, place: str, base: Path, own: _Settings | None, common: _Settings) -> SceneRequest | None:
+def _scene(name: str, place: str, find: Finder, own: _Settings | None, common: _Settings) -> SceneRequest | None:
     """One scene with its settings, None where it cannot be found."""
     problems = common.table.problems
     try:
-        source = sources.find(name, base)
+        source = find(name)
     except DartboardError as error:
         problems.add(f"{place}: {error}")
         return None

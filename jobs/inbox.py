@@ -1,9 +1,9 @@
 """
 Requests to an owner that has no server: small files in ``inbox/``, which the dispatcher reads several times a second.
 
-``dartboard cancel`` and ``retry`` use it beside a ``dartboard run``. A request is written aside and renamed, so
-the owner never sees half of one, and it vanishes only after it was served: an owner that is killed in between
-leaves it to the next. Serving one twice does no harm.
+``dartboard cancel``, ``retry``, ``pause`` and ``resume`` use it beside a ``dartboard run``. A request is written aside
+and renamed, so the owner never sees half of one, and it vanishes only after it was served: an owner that is killed in
+between leaves it to the next. Serving one twice does no harm.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 from jobs.errors import DataDirectoryProblem
 
 FOLDER = "inbox"
-KINDS = ("cancel", "retry")
+KINDS = ("cancel", "retry", "pause", "resume")
 MAX_BYTES = 4096  # of a request: they have about 40
 
 log = logging.getLogger("dartboard")

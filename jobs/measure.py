@@ -21,7 +21,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from jobs import points
 from jobs.artifacts import Artifacts
+from jobs.points import VERSIONS
 from jobs.store import Row, Store, now
 from renderer.errors import DartboardError
 from renderer.images import read_picture
@@ -29,7 +31,6 @@ from renderer.metrics import METRICS, Reference, measure, nonfinite
 
 KEPT_BYTES = 256 * 2**20  # of references in memory; a grid works on one scene at a time
 PAGE = 200  # cells that are looked through for gaps at a time, some milliseconds
-VERSIONS = json.dumps({name: metric.version for name, metric in METRICS.items()})
 
 log = logging.getLogger("dartboard")
 
@@ -45,6 +46,7 @@ class Measurer:
 
     def look_for_gaps(self) -> None:
         """Everything in the data directory that lacks a metric: after a start, or a new version of a formula."""
+        points.fill_gaps(self.store)
         self.searches.extend((row["reference_id"], 0) for row in self.store.rows("reference_ids"))
 
     def add(self, replicate_id: int) -> None:
@@ -91,6 +93,7 @@ class Measurer:
             revision = self.store.insert("add_event", at=now(), what="measure", cell_id=None, experiment_id=None)
             for cell in measured:
                 self.store.run("touch", cell_id=cell, revision=revision)
+            points.refresh(self.store, measured)
 
     def _measure(self, pair: Row) -> bool:
         """All metrics of one pair; False if a file could not be read."""

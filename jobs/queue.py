@@ -186,14 +186,39 @@ def cancel(store: Store, experiment: int) -> list[int]:
 
     The ids of the cells that were running for it alone: whoever renders them should kill that now.
     """
+    return _stop(store, experiment, "set_cancelled", "cancelled")
+
+
+def pause(store: Store, experiment: int) -> list[int]:
+    """
+    Like ``cancel``, for a while: ``resume`` goes on. A picture that is being drawn is begun again then.
+    """
+    if not store.value("is_live", experiment_id=experiment):
+        return []
+    return _stop(store, experiment, "set_paused", "released")
+
+
+def resume(store: Store, experiment: int) -> int:
+    """End a pause; in how many places of its plan the experiment wants something."""
     with store.transaction():
-        if not store.run("set_cancelled", experiment_id=experiment, at=now()):
-            return []
-        store.run("close_experiment", experiment_id=experiment)
-        running = [row["id"] for row in store.rows("unwanted_running", experiment_id=experiment)]
-        store.run("end_attempts", cells=json.dumps(running), at=now(), outcome="cancelled")
-        _move_many(store, "cancel", "move_unwanted", experiment)
-    return running
+        if not store.run("set_paused", experiment_id=experiment, at=None):
+            return 0
+        return want(store, experiment) if store.value("is_live", experiment_id=experiment) else 0
+
+
+def delete(store: Store, experiment: int) -> list[int]:
+    """Put an experiment into the trash (jobs/trash.py), cancelling what it misses; the cells as for ``cancel``."""
+    return _stop(store, experiment, "set_deleted", "cancelled")
+
+
+def restore(store: Store, experiment: int) -> None:
+    """Take an experiment out of the trash: as live as it was before."""
+    with store.transaction():
+        if store.run("set_deleted", experiment_id=experiment, at=None):
+            if store.value("is_live", experiment_id=experiment):
+                want(store, experiment)
+            else:
+                _event(store, "restore", experiment=experiment)
 
 
 def retry(store: Store, experiment: int) -> int:
@@ -206,6 +231,7 @@ def retry(store: Store, experiment: int) -> int:
         failed = json.dumps([row["id"] for row in store.rows("failed_cells", experiment_id=experiment)])
         store.run("forgive", cells=failed)
         store.run("set_cancelled", experiment_id=experiment, at=None)
+        store.run("set_paused", experiment_id=experiment, at=None)
         _move_many(store, "retry", "move_missing", experiment)
         opened = want(store, experiment)
         store.run("open_everywhere", cells=failed)
@@ -215,9 +241,15 @@ def retry(store: Store, experiment: int) -> int:
 def want(store: Store, experiment: int) -> int:
     """Make an experiment live and open what it misses, except what has failed; in how many places of its plan."""
     with store.transaction():
-        store.run("set_cancelled", experiment_id=experiment, at=None)
+        for mark in ("set_cancelled", "set_paused", "set_deleted"):
+            store.run(mark, experiment_id=experiment, at=None)
         _move_many(store, "want", "move_missing", experiment)
         return store.run("open_experiment", experiment_id=experiment)
+
+
+def note(store: Store, what: str) -> None:
+    """An event that concerns no single cell or experiment: whoever follows should look again."""
+    _event(store, what)
 
 
 def _event(store: Store, what: str, *, cell: int | None = None, experiment: int | None = None) -> int:
@@ -250,6 +282,18 @@ def _missing(store: Store, cell: int, experiment: int | None) -> tuple[tuple[str
 def _end(store: Store, work: Work, outcome: str, error: str | None = None, log: str | None = None) -> bool:
     """Close the attempt; False if it had ended already."""
     return store.run("end_attempt", attempt_id=work.attempt_id, at=now(), outcome=outcome, error=error, log=log) == 1
+
+
+def _stop(store: Store, experiment: int, mark: str, outcome: str) -> list[int]:
+    """Close an experiment under a mark; the cells that were running for it alone."""
+    with store.transaction():
+        if not store.run(mark, experiment_id=experiment, at=now()):
+            return []
+        store.run("close_experiment", experiment_id=experiment)
+        running = [row["id"] for row in store.rows("unwanted_running", experiment_id=experiment)]
+        store.run("end_attempts", cells=json.dumps(running), at=now(), outcome=outcome)
+        _move_many(store, "cancel", "move_unwanted", experiment)
+    return running
 
 
 def _leave(store: Store, cell: int, name: str) -> str:

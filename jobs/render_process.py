@@ -28,6 +28,7 @@ from typing import IO, Any
 
 PASS_EVENT_SECONDS = 0.1  # between two progress events of one replicate
 PREVIEW_SECONDS = 0.5  # between two previews, and before the first: quick cells need none
+PREVIEW_SIDE = 256  # pixels: what an image grid shows
 
 
 def main() -> int:
@@ -90,9 +91,9 @@ class RenderProcess:
             if now - last >= PASS_EVENT_SECONDS or progress.passes_done == progress.passes > 1:
                 last = now
                 role, k = wanted[progress.replicate]
-                self.tell("pass", order=order["order"], role=role, k=k, done=progress.passes_done,
-                          passes=progress.passes, seconds=progress.seconds)  # fmt: skip
                 previews.show(progress)
+                self.tell("pass", order=order["order"], role=role, k=k, done=progress.passes_done,
+                          passes=progress.passes, seconds=progress.seconds, preview=previews.count)  # fmt: skip
 
         seeds = [seed(spec.digest, k, reference=role == "reference") for role, k in wanted]
         for (role, k), rendering in zip(wanted, render(spec, loaded, seeds, on_pass), strict=True):
@@ -135,22 +136,29 @@ class RenderProcess:
 
 
 class Previews:
-    """A small file that refines while a cell renders: sRGB PNG, replaced in one step, gone at the end."""
+    """
+    A small file that refines while a cell renders: the first replicate so far as a float16 array (H, W, 3) of at most
+    PREVIEW_SIDE pixels a side, replaced in one step, gone at the end. Whoever shows it does the tone mapping.
+    """
 
     def __init__(self, path: str | None):
         self.path = Path(path) if path else None
         self.last = time.monotonic()
+        self.count = 0
 
     def show(self, progress: Any) -> None:
         if self.path is None or time.monotonic() - self.last < PREVIEW_SECONDS:
             return
-        import mitsuba as mi
+        import numpy as np
 
-        bitmap = mi.Bitmap(progress.picture()).convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, True)
-        temporary = self.path.with_suffix(".part.png")
-        bitmap.write(str(temporary))
+        from renderer.previews import shrink, to_half
+
+        temporary = self.path.with_suffix(".part")
+        with temporary.open("wb") as file:
+            np.save(file, to_half(shrink(progress.picture(), PREVIEW_SIDE)))
         temporary.replace(self.path)
         self.last = time.monotonic()
+        self.count += 1
 
     def end(self) -> None:
         if self.path is not None:

@@ -9,18 +9,16 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from statistics import fmean, stdev
 from typing import Any, TextIO
 
+from jobs.points import VERSIONS
 from jobs.store import Row, Store
 from renderer.metrics import METRICS
 
 KEYS = ("experiment", "scene", "integrator", "sampler", "spp", "spp_actual", "replicate")
 TAIL = ("render_seconds", "compile_seconds", "state")
-VERSIONS = json.dumps({name: metric.version for name, metric in METRICS.items()})  # a value of another is not shown
 
 
 @dataclass(frozen=True)
@@ -70,15 +68,12 @@ def rows(store: Store, experiment: int) -> Iterator[Row]:
 
 def summary(store: Store, experiment: int) -> list[Point]:
     """Mean and standard error of every metric for every cell that has values, in the order of the plan."""
-    groups: dict[tuple[Any, ...], list[float]] = {}
-    sweeps = _sweeps(store, experiment)
-    for row in rows(store, experiment):
-        sweep = tuple((name, row[name]) for name in sweeps if row[name] is not None)
-        cell = (row["scene"], row["integrator"], row["sampler"], row["spp"], row["spp_actual"], sweep)
-        for name in METRICS:
-            if row[name] is not None:
-                groups.setdefault((*cell, name), []).append(row[name])
-    return [_point(key, found) for key, found in groups.items()]
+    found: dict[tuple[Any, ...], Point] = {}
+    for row in store.stream("points", experiment_id=experiment, versions=VERSIONS, scene=None):
+        sweep = tuple(json.loads(row["sweep"]).items()) if row["sweep"] else ()
+        cell = (row["scene"], row["integrator"], row["sampler"], row["spp"], row["spp_actual"])
+        found[row["position"], row["name"]] = Point(*cell, row["name"], row["n"], row["mean"], row["error"], sweep)
+    return list(found.values())
 
 
 def write_csv(found: Iterable[Row], file: TextIO) -> None:
@@ -104,9 +99,3 @@ def write_json(found: Iterable[Row], file: TextIO) -> None:
 
 def _sweeps(store: Store, experiment: int) -> list[str]:
     return [row["name"] for row in store.rows("sweep_parameters", experiment_id=experiment)]
-
-
-def _point(key: tuple[Any, ...], found: list[float]) -> Point:
-    scene, integrator, sampler, spp, spp_actual, sweep, metric = key
-    error = stdev(found) / math.sqrt(len(found)) if len(found) > 1 else None
-    return Point(scene, integrator, sampler, spp, spp_actual, metric, len(found), fmean(found), error, sweep)

@@ -95,6 +95,15 @@ class Store:
                     self.connection.execute("rollback")
                 raise
 
+    @contextlib.contextmanager
+    def without_foreign_keys(self) -> Iterator[None]:
+        """Rows may be deleted in any order; the caller leaves none that points nowhere. Not inside a transaction."""
+        self.connection.pragma("foreign_keys", False)
+        try:
+            yield
+        finally:
+            self.connection.pragma("foreign_keys", True)
+
     def run(self, name: str, /, **parameters: Any) -> int:
         """Execute a named statement; how many rows it changed."""
         with told(self.path):

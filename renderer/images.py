@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import threading
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,8 @@ from numpy.typing import NDArray
 from renderer.errors import DartboardError
 
 HEADER_PREFIX = "dartboard:"  # every attribute of ours is text under this name
+
+_STDOUT = threading.Lock()  # two threads that swap it would leave it swapped
 
 Floats = NDArray[np.float32]
 
@@ -82,11 +85,12 @@ def _open(path: Path, **options: bool) -> Iterator[Any]:
 
 @contextlib.contextmanager
 def _stdout_to_stderr() -> Iterator[None]:
-    """OpenEXR prints warnings to the C stdout, where they would spoil ``--json``."""
-    saved = os.dup(1)
-    try:
-        os.dup2(2, 1)
-        yield
-    finally:
-        os.dup2(saved, 1)
-        os.close(saved)
+    """OpenEXR prints warnings to the C stdout, where they would spoil ``--json``. One thread at a time."""
+    with _STDOUT:
+        saved = os.dup(1)
+        try:
+            os.dup2(2, 1)
+            yield
+        finally:
+            os.dup2(saved, 1)
+            os.close(saved)

@@ -25,7 +25,7 @@ class Order:
     trust       "builtin" or the scene's digest: a process serves one trust class and is never reused for another
     replicates  (role, k) to draw, in this order
     out         folder that gets the pictures
-    preview     file that refines while the cell renders
+    preview     file (.npy, float16, see render_process.Previews) that refines while the cell renders
     """
 
     order: int
@@ -46,7 +46,10 @@ class Started:
 
 @dataclass(frozen=True)
 class Passed:
-    """Progress inside a replicate: ``done`` of ``passes``, ``seconds`` since its start."""
+    """
+    Progress inside a replicate: ``done`` of ``passes``, ``seconds`` since its start. ``preview`` grows with every
+    preview that was written for the order.
+    """
 
     order: int
     role: str
@@ -54,6 +57,7 @@ class Passed:
     done: int
     passes: int
     seconds: float
+    preview: int = 0
 
 
 @dataclass(frozen=True)
@@ -116,6 +120,10 @@ class Executor(Protocol):
 
     def wake(self) -> None:
         """End a wait in ``events`` early; safe in a signal handler."""
+        ...
+
+    def rest(self) -> None:
+        """End processes that have nothing to do; the next order starts them again."""
         ...
 
     def close(self) -> None:

@@ -114,6 +114,10 @@ class LocalExecutor:
         if self.child is None:
             self._start((colour, trust))
 
+    def rest(self) -> None:
+        if self.child is not None and not self.child.sent and not self.waiting:
+            self._end_child()
+
     def close(self) -> None:
         self._end_child()
         self.waiting.clear()

@@ -19,16 +19,25 @@ select id, digest from scene;
 select * from scene where digest = :digest;
 
 -- name: experiment_by_digest
-select id from experiment where digest = :digest;
+select id, deleted_at from experiment where digest = :digest;
 
 -- name: experiment_by_id
 select * from experiment where id = :id;
 
 -- name: experiment_by_name
-select * from experiment where name = :name order by id desc limit 1;
+select * from experiment where name = :name and deleted_at is null order by id desc limit 1;
 
 -- name: experiments
-select * from experiment order by id;
+select * from experiment where deleted_at is null order by id;
+
+-- name: submission
+select digest, experiment_id from submission where key = :key;
+
+-- name: add_submission
+insert into submission (key, digest, experiment_id, at) values (:key, :digest, :experiment_id, :at);
+
+-- name: forget_submissions
+delete from submission where at < :before;
 
 -- name: add_experiment
 insert into experiment (digest, name, created_at, grid) values (:digest, :name, :created_at, :grid);
@@ -158,6 +167,15 @@ update experiment_cell set open = 0 where cell_id = :cell_id and open = 1;
 -- name: set_cancelled
 update experiment set cancelled_at = :at where id = :experiment_id and (cancelled_at is null) = (:at is not null);
 
+-- name: set_paused
+update experiment set paused_at = :at where id = :experiment_id and (paused_at is null) = (:at is not null);
+
+-- name: set_deleted
+update experiment set deleted_at = :at where id = :experiment_id and (deleted_at is null) = (:at is not null);
+
+-- name: is_live
+select cancelled_at is null and paused_at is null and deleted_at is null from experiment where id = :experiment_id;
+
 -- name: close_experiment
 update experiment_cell set open = 0 where experiment_id = :experiment_id and open = 1;
 
@@ -169,7 +187,8 @@ where experiment_id = :experiment_id and open = 0 and had < replicates
 -- name: open_everywhere
 update experiment_cell set open = 1
 where open = 0 and had < replicates and cell_id in (select value from json_each(:cells))
-    and experiment_id in (select id from experiment where cancelled_at is null);
+    and experiment_id in (
+        select id from experiment where cancelled_at is null and paused_at is null and deleted_at is null);
 
 -- name: failed_cells
 select distinct cell.id
@@ -198,6 +217,12 @@ select role, state, count(*) as cells, sum(had) as had, sum(replicates) as wante
 from (select distinct role, cell_id, state, had, replicates from standing where experiment_id = :experiment_id)
 group by role, state;
 
+-- name: open_cells
+select count(*) from experiment_cell where open = 1;
+
+-- name: experiments_of_cell
+select experiment_id as id, scene, integrator, sampler from experiment_cell where cell_id = :cell_id;
+
 -- name: samples_left
 select sum((replicates - had) * 1.0 * spp * pixels)
 from (
@@ -212,6 +237,162 @@ select
 from standing as wanted join cell on cell.id = wanted.cell_id
 where wanted.experiment_id = :experiment_id and wanted.state = 'failed'
 order by wanted.position;
+
+
+-- Deleting ---------------------------------------------------------------------------------------------------------
+
+-- name: doomed
+-- Cells that nobody has but this experiment, deleted ones included: those can come back.
+select cell_id as id from experiment_cell as wanted
+where experiment_id = :experiment_id
+    and not exists (select 1 from experiment_cell where cell_id = wanted.cell_id and experiment_id <> :experiment_id)
+group by cell_id;
+
+-- name: deleted_before
+select id from experiment where deleted_at < :before order by id;
+
+-- name: images_of_cells
+select image from replicate where cell_id in (select value from json_each(:cells));
+
+-- name: logs_of_cells
+select log from attempt where log is not null and cell_id in (select value from json_each(:cells));
+
+-- name: purge_metrics
+delete from metric
+where reference_id in (select value from json_each(:cells))
+    or replicate_id in (select id from replicate where cell_id in (select value from json_each(:cells)));
+
+-- name: purge_replicates
+delete from replicate where cell_id in (select value from json_each(:cells));
+
+-- name: purge_attempts
+delete from attempt where cell_id in (select value from json_each(:cells));
+
+-- name: purge_events
+delete from event
+where experiment_id = :experiment_id or cell_id in (select value from json_each(:cells));
+
+-- name: purge_points
+delete from point where experiment_id = :experiment_id;
+
+-- name: purge_submissions
+delete from submission where experiment_id = :experiment_id;
+
+-- name: purge_wanted
+delete from experiment_cell where experiment_id = :experiment_id;
+
+-- name: purge_cells
+delete from cell where id in (select value from json_each(:cells));
+
+-- name: purge_experiment
+delete from experiment where id = :experiment_id;
+
+
+-- Points -----------------------------------------------------------------------------------------------------------
+
+-- name: refresh_errors
+insert or replace into point (experiment_id, position, name, version, n, mean, error)
+select
+    experiment_id, position, name, version, count(*), avg(value),
+    case when count(*) > 1 then sqrt(sum((value - middle) * (value - middle)) / (count(*) - 1) / count(*)) end
+from (
+    select wanted.experiment_id, wanted.position, metric.name, metric.version, metric.value,
+        avg(metric.value) over (partition by wanted.experiment_id, wanted.position, metric.name) as middle
+    from json_each(:cells) as given
+    cross join experiment_cell as wanted on wanted.cell_id = given.value and wanted.role = 'cell'
+    cross join experiment_cell as reference
+        on reference.cell_id = wanted.reference_id and reference.experiment_id = wanted.experiment_id
+        and reference.role = 'reference'
+    cross join replicate
+        on replicate.cell_id = wanted.cell_id and replicate.role = 'cell' and replicate.k < wanted.replicates
+    cross join metric
+        on metric.replicate_id = replicate.id and metric.reference_id = reference.cell_id
+        and metric.reference_replicates = reference.replicates and metric.region = '' and metric.value is not null
+    join json_each(:versions) as formula on formula.key = metric.name and formula.value = metric.version
+    group by wanted.experiment_id, wanted.position, metric.name, metric.replicate_id
+)
+group by experiment_id, position, name;
+
+-- name: refresh_seconds
+insert or replace into point (experiment_id, position, name, version, n, mean, conditions)
+select
+    wanted.experiment_id, wanted.position, 'render_seconds', 0, count(*), avg(replicate.render_seconds),
+    group_concat(distinct machine || ', ' || device || ', ' || threads || ' threads, ' || neighbours || ' beside it')
+from json_each(:cells) as given
+cross join experiment_cell as wanted on wanted.cell_id = given.value
+cross join replicate
+    on replicate.cell_id = wanted.cell_id and replicate.role = wanted.role and replicate.k < wanted.replicates
+group by wanted.experiment_id, wanted.position;
+
+-- name: without_points
+select id from experiment
+where exists (select 1 from experiment_cell where experiment_id = experiment.id and had > 0)
+    and not exists (select 1 from point where experiment_id = experiment.id);
+
+-- name: cells_of_experiment
+select distinct cell_id from experiment_cell where experiment_id = :experiment_id and had > 0;
+
+-- name: measured_names
+select distinct name from point where experiment_id = :experiment_id;
+
+-- name: points
+-- One row per cell and metric, in the order of the plan, with the mean time where it is known.
+select
+    wanted.position, wanted.cell_id as cell, wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp,
+    cell.spp as spp_actual, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    point.name, point.n, point.mean, point.error, seconds.mean as seconds, seconds.conditions
+from experiment_cell as wanted
+cross join cell on cell.id = wanted.cell_id
+cross join json_each(:versions) as formula
+cross join point
+    on point.experiment_id = wanted.experiment_id and point.position = wanted.position and point.name = formula.key
+    and point.version = formula.value
+left join point as seconds
+    on seconds.experiment_id = wanted.experiment_id and seconds.position = wanted.position
+    and seconds.name = 'render_seconds'
+where wanted.experiment_id = :experiment_id and wanted.role = 'cell' and (:scene is null or wanted.scene = :scene)
+order by wanted.position;
+
+
+-- Cells as an experiment sees them ---------------------------------------------------------------------------------
+
+-- name: cells_page
+select
+    wanted.position, wanted.cell_id as cell, wanted.role, wanted.scene, wanted.integrator, wanted.sampler,
+    wanted.spp_asked as spp, cell.spp as spp_actual, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    wanted.state, wanted.had, wanted.replicates as wanted, wanted.reference_id as reference,
+    cell.error_class, cell.error,
+    (select json_group_array(json_array(name, version, mean, error, n)) from point
+     where experiment_id = wanted.experiment_id and position = wanted.position) as points
+from standing as wanted join cell on cell.id = wanted.cell_id
+where wanted.experiment_id = :experiment_id and wanted.position >= :start
+order by wanted.position limit :limit;
+
+-- name: cells_changed
+select
+    wanted.position, wanted.cell_id as cell, wanted.role, wanted.scene, wanted.integrator, wanted.sampler,
+    wanted.spp_asked as spp, cell.spp as spp_actual, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    wanted.state, wanted.had, wanted.replicates as wanted, wanted.reference_id as reference,
+    cell.error_class, cell.error,
+    (select json_group_array(json_array(name, version, mean, error, n)) from point
+     where experiment_id = wanted.experiment_id and position = wanted.position) as points
+from cell indexed by cell_revision
+cross join standing as wanted on wanted.cell_id = cell.id
+where cell.revision > :after and wanted.experiment_id = :experiment_id and wanted.position >= :start
+order by wanted.position limit :limit;
+
+-- name: experiment_touched
+select exists (select 1 from event where revision > :after and experiment_id = :experiment_id);
+
+-- name: cell_by_id
+select cell.*, scene.name as scene_name from cell join scene on scene.id = cell.scene_id where cell.id = :id;
+
+-- name: attempts
+select id, started_at, ended_at, machine, device, outcome, error, log from attempt where cell_id = :cell_id order by id;
+
+-- name: images
+select k, image from replicate where cell_id = :cell_id and role = :role order by k;
+
 
 
 -- Results ----------------------------------------------------------------------------------------------------------

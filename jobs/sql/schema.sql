@@ -35,8 +35,10 @@ create table experiment (
     digest       text not null unique,
     name         text not null,
     created_at   text not null,
-    cancelled_at text,                                   -- null: live
-    grid         text not null                           -- canonical JSON, see jobs/gridspec.py
+    cancelled_at text,                                   -- null: not cancelled
+    grid         text not null,                          -- canonical JSON, see jobs/gridspec.py
+    paused_at    text,                                   -- null: not paused
+    deleted_at   text                                    -- null: there; else it is gone for good some minutes later
 ) strict;
 create index experiment_name on experiment (name);
 
@@ -118,6 +120,28 @@ create table metric (
     check ((value is null) = (reason is not null))
 ) strict, without rowid;
 
+-- A request that a client may send again: the same key and body is the same submission.
+create table submission (
+    key           text primary key,
+    digest        text not null,                         -- of the grid
+    experiment_id integer not null references experiment (id),
+    at            text not null
+) strict;
+
+-- One point of a plot, kept ready by jobs/points.py: a metric, or render_seconds, over the replicates that an
+-- experiment wants of a cell. Derived: every row can be computed again from metric and replicate.
+create table point (
+    experiment_id integer not null references experiment (id),
+    position      integer not null,
+    name          text not null,
+    version       integer not null,                      -- of the formula; 0 for render_seconds
+    n             integer not null check (n > 0),
+    mean          real not null,
+    error         real,                                  -- standard error of the mean; null for n = 1
+    conditions    text,                                  -- of render_seconds: machine, device, threads, neighbours
+    primary key (experiment_id, position, name)
+) strict, without rowid;
+
 -- What happened, in order; its last revision is the store's.
 create table event (
     revision      integer primary key autoincrement,
@@ -136,6 +160,7 @@ select
         when wanted.had = wanted.replicates then 'done'
         when wanted.open then cell.state
         when cell.state = 'failed' then 'failed'
+        when (select paused_at from experiment where id = wanted.experiment_id) is not null then 'paused'
         else 'cancelled'
     end as state
 from experiment_cell as wanted join cell on cell.id = wanted.cell_id;

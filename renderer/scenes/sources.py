@@ -79,6 +79,11 @@ def find(name: str, base: Path) -> SceneSource:
     raise SceneError(f"scene {shown(name)} is not in {base}; a scene is a path from there, or one of {_builtins()}")
 
 
+def kept(name: str, folder: Path, main: str) -> SceneSource:
+    """The scene in a snapshot, under the name that somebody gave it. Raises ``SceneError``."""
+    return _read(name, folder, main, builtin=False)
+
+
 def snapshot(source: SceneSource, into: Path) -> Path:
     """
     Copies the scene to ``into/<digest>/`` and returns that folder; does nothing where it is already there.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from hypothesis import strategies as st
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from jobs import grid
 from jobs.gridspec import GridSpec
 from renderer.errors import DartboardError
+from renderer.scenes import sources
 
 HERE = Path(__file__).parent
 
@@ -71,7 +73,9 @@ def _with_scene_tables(table):
 
 def parse(table=None, base: Path = HERE, **keys) -> GridSpec:
     """A grid of the cornell box and whatever else is said."""
-    return grid.parse({"scenes": ["cornell_box"], **(table or {}), **keys}, base=base, origin="grid.toml")
+    return grid.parse(
+        {"scenes": ["cornell_box"], **(table or {}), **keys}, find=partial(sources.find, base=base), origin="grid.toml"
+    )
 
 
 def complaints(table=None, **keys) -> tuple[str, ...]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -17,6 +18,7 @@ from jobs.executors.local import LocalExecutor
 from jobs.queue import MAX_ATTEMPTS
 from jobs.store import Store
 from renderer import devices
+from renderer.scenes import sources
 
 GRID = {
     "name": "small", "scenes": ["cornell_box"], "samplers": ["independent", "stratified"], "spp": [4, 16],
@@ -40,7 +42,7 @@ def test_a_cell_that_kills_its_process_fails_alone(
 ) -> None:
     """The bad cell is tried MAX_ATTEMPTS times, ends as failed with its reason, and everything else is rendered."""
     store, artifacts, local = data
-    planned = plan.expand(grid.parse(GRID, base=tmp_path, origin="test"))
+    planned = plan.expand(grid.parse(GRID, find=partial(sources.find, base=tmp_path), origin="test"))
     experiment, _ = experiments.submit(store, planned, artifacts.scenes)
     bad = planned.cells[1].spec.digest
     tries = 0
@@ -68,7 +70,7 @@ def test_a_cell_that_kills_its_process_fails_alone(
 def test_stop_gives_back_what_was_claimed(data: tuple[Store, Artifacts, LocalExecutor], tmp_path: Path) -> None:
     """After ``stop`` no cell is running and no attempt is open; a second run completes the grid."""
     store, artifacts, local = data
-    planned = plan.expand(grid.parse(GRID, base=tmp_path, origin="test"))
+    planned = plan.expand(grid.parse(GRID, find=partial(sources.find, base=tmp_path), origin="test"))
     experiment, _ = experiments.submit(store, planned, artifacts.scenes)
     first = Dispatcher(
         store, artifacts, local, machine="here", device="llvm", experiment=experiment.id,

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import tomllib
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -271,13 +272,13 @@ def test_a_mistake_repeated_a_thousand_times_stays_readable():
 
 def test_a_grid_without_scenes_says_what_to_add():
     with pytest.raises(GridError, match=r'scenes is missing in g\.toml.*scenes = \["cornell_box"\]'):
-        grid.parse({}, base=ROOT, origin="g.toml")
+        grid.parse({}, find=partial(sources.find, base=ROOT), origin="g.toml")
 
 
 @pytest.mark.parametrize("data", [[], 3, None, "scenes"])
 def test_a_request_that_is_no_table_is_refused(data):
     with pytest.raises(GridError, match="a grid is a table"):
-        grid.parse(data, base=ROOT, origin="the request")
+        grid.parse(data, find=partial(sources.find, base=ROOT), origin="the request")
 
 
 def test_a_million_cells_are_refused_before_any_is_made(monkeypatch):
@@ -318,7 +319,7 @@ def test_a_scene_file_with_impossible_settings_says_which_key_replaces_them(monk
 
 def complaints_in(base, **table):
     with pytest.raises(GridError) as caught:
-        grid.parse(table, base=base, origin="grid.toml")
+        grid.parse(table, find=partial(sources.find, base=base), origin="grid.toml")
     return caught.value.problems
 
 
@@ -387,7 +388,7 @@ keys = st.sampled_from(["name", "scenes", "samplers", "integrators", "spp", "rep
 def test_arbitrary_requests_never_raise_anything_else(data):
     """DartboardError or a grid; ``base`` is a folder without scenes."""
     try:
-        spec = grid.parse(data, base=ROOT / "jobs", origin="request")
+        spec = grid.parse(data, find=partial(sources.find, base=ROOT / "jobs"), origin="request")
     except DartboardError as error:
         assert str(error)
     else:

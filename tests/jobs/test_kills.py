@@ -17,9 +17,11 @@ ROOT = Path(__file__).parents[2]
 OWNER = """
 import sys
 from pathlib import Path
+from functools import partial
 from jobs import experiments, grid, owner, plan, queue
 from jobs.artifacts import Artifacts
 from jobs.store import Store
+from renderer.scenes import sources
 data = Path(sys.argv[1])
 with owner.own(data):
     artifacts = Artifacts(data)
@@ -28,7 +30,7 @@ with owner.own(data):
     queue.recover(store)
     for name, replicates in (("one", 2), ("two", 3)):
         asked = {"name": name, "scenes": "cornell_box", "spp": [*range(1, 100)], "replicates": replicates}
-        spec = grid.parse({**asked, "reference": {"spp": 200}}, base=data, origin="a test")
+        spec = grid.parse({**asked, "reference": {"spp": 200}}, find=partial(sources.find, base=data), origin="a test")
         experiments.submit(store, plan.expand(spec), artifacts.scenes)
         print(name, flush=True)
     while work := queue.claim(store, machine="here", device="llvm"):

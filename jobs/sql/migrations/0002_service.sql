@@ -1,0 +1,40 @@
+-- 0002_service.sql
+-- What a server needs: pausing, deleting with a way back, submitting once under a key, and the points of plots kept
+-- ready, so that a page of a large grid is read and not computed. Old experiments are neither paused nor deleted; their
+-- points are filled in by the next owner (jobs/points.py).
+
+alter table experiment add column paused_at text;
+alter table experiment add column deleted_at text;
+
+create table submission (
+    key           text primary key,
+    digest        text not null,
+    experiment_id integer not null references experiment (id),
+    at            text not null
+) strict;
+
+create table point (
+    experiment_id integer not null references experiment (id),
+    position      integer not null,
+    name          text not null,
+    version       integer not null,
+    n             integer not null check (n > 0),
+    mean          real not null,
+    error         real,
+    conditions    text,
+    primary key (experiment_id, position, name)
+) strict, without rowid;
+
+drop view standing;
+create view standing as
+select
+    wanted.*,
+    cell.revision as revision,
+    case
+        when wanted.had = wanted.replicates then 'done'
+        when wanted.open then cell.state
+        when cell.state = 'failed' then 'failed'
+        when (select paused_at from experiment where id = wanted.experiment_id) is not null then 'paused'
+        else 'cancelled'
+    end as state
+from experiment_cell as wanted join cell on cell.id = wanted.cell_id;

@@ -1,0 +1,55 @@
+"""Scenes: those that are built in, and those that clients bring."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from fastapi import APIRouter, Query, Request
+from fastapi.concurrency import run_in_threadpool
+
+from renderer.scenes import sources
+from renderer.scenes.builtin import BUILTIN
+from renderer.scenes.sources import SceneSource
+from service import bodies, schemas, uploads
+from service.deps import EngineDep
+from service.problems import RESPONSES
+
+router = APIRouter(prefix="/api/scenes", tags=["scenes"], responses=RESPONSES)
+
+ZIP = {
+    "requestBody": {
+        "required": True,
+        "content": {"application/zip": {"schema": {"type": "string", "format": "binary"}}},
+    }
+}
+
+
+@router.get("")
+def list_scenes() -> list[schemas.Scene]:
+    """The built-in scenes with what their files say about size, integrator and sampler."""
+    return [_scene(sources.find(name, Path())) for name in BUILTIN]
+
+
+@router.post("", openapi_extra=ZIP, status_code=201)
+async def upload(
+    request: Request,
+    engine: EngineDep,
+    name: Annotated[str, Query(min_length=1, max_length=200, description="what grids will call it")],
+    main: Annotated[str | None, Query(max_length=200, description="its XML file, where the folder has several")] = None,
+) -> schemas.Scene:
+    """
+    Upload a scene: a zip of its folder, at most 64 MiB. It is vetted (only plugins that ship with Mitsuba, only files
+    of its own folder) and kept by its digest; a submission then says `"scenes": {NAME: digest}`.
+    """
+    with await bodies.save(request, bodies.SCENE_BYTES, f"the archive of {name!r}") as archive:
+        return _scene(await run_in_threadpool(uploads.receive, engine, archive, name, main))
+
+
+def _scene(source: SceneSource) -> schemas.Scene:
+    said = source.defaults
+    return schemas.Scene(
+        name=source.name, digest=source.digest, builtin=source.builtin, main=source.main, width=said.width,
+        height=said.height, max_depth=said.max_depth, integrator=said.integrator, sampler=said.sampler, spp=said.spp,
+        files=[file.path for file in source.files],
+    )  # fmt: skip

@@ -1,0 +1,47 @@
+"""Bodies of requests, read up to a stated limit and never more."""
+
+from __future__ import annotations
+
+import tempfile
+from typing import IO
+
+from fastapi import Request
+
+from service.problems import TooLarge
+
+GRID_BYTES = 2**24  # a grid file of 16 MiB is refused on the command line too
+SCENE_BYTES = 2**26  # of a scene as a zip
+
+
+async def read(request: Request, limit: int, what: str) -> bytes:
+    """The body. Raises ``TooLarge`` as soon as it is."""
+    with tempfile.SpooledTemporaryFile(limit + 1) as file:
+        await _copy(request, file, limit, what)
+        file.seek(0)
+        return file.read()
+
+
+async def save(request: Request, limit: int, what: str) -> IO[bytes]:
+    """The body in a temporary file, at its start; the caller closes it. Raises ``TooLarge`` as soon as it is."""
+    file = tempfile.TemporaryFile()  # noqa: SIM115 - the caller's
+    try:
+        await _copy(request, file, limit, what)
+    except BaseException:
+        file.close()
+        raise
+    file.seek(0)
+    return file
+
+
+async def _copy(request: Request, file: IO[bytes], limit: int, what: str) -> None:
+    told = request.headers.get("content-length", "")
+    size = int(told) if told.isdecimal() else 0
+    if size <= limit:
+        size = 0
+        async for chunk in request.stream():
+            size += len(chunk)
+            if size > limit:
+                break
+            file.write(chunk)
+    if size > limit:
+        raise TooLarge(f"{what} has more than {limit >> 20} MiB; send less")

@@ -1,0 +1,318 @@
+"""
+The engine: the thread that owns the data directory while the server runs.
+
+It opens the database for writing, runs the dispatcher and its render process, and does every change that a route asks
+for (``do``), one after the other. Routes read through connections of their own (``Readers``). A disk that is full or a
+renderer that does not start stalls it, with the reason on every page; it tries again by itself and when asked.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import datetime
+import logging
+import platform
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass, replace
+from pathlib import Path
+from queue import LifoQueue
+from typing import Any, TypeVar
+
+from jobs import experiments, queue, trash
+from jobs.artifacts import Artifacts
+from jobs.dispatcher import Dispatcher, News
+from jobs.executors.base import Failed, Finished, Passed
+from jobs.executors.local import LocalExecutor
+from jobs.store import Store
+from renderer.devices import Device
+from renderer.errors import DartboardError, EnvironmentProblem
+from service.settings import usable_kernel_caches
+
+T = TypeVar("T")
+Change = Callable[[Store, Dispatcher], T]
+
+RETRY_SECONDS = 10.0  # after a stall
+CHANGE_SECONDS = 60.0  # longest wait for a change: a grid of 100 000 cells takes 5 s on a slow disk
+CLEANING_SECONDS = 60.0  # between two looks into the trash
+MEMORY = 0.8  # of the rate of drawing: what a new picture leaves of the old estimate
+READERS = 6  # read-only connections that are kept; more are opened when needed
+READER_CACHE_KIB = 8192
+
+log = logging.getLogger("dartboard")
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """The picture that is being drawn, and the experiments that want it."""
+
+    cell: int
+    role: str
+    replicate: int
+    description: str
+    experiments: tuple[int, ...]
+    done: int = 0
+    passes: int = 0
+    seconds: float = 0.0
+    preview: int = 0
+
+
+@dataclass(frozen=True)
+class Moment:
+    """
+    What the engine is doing: replaced as a whole, so that other threads read it without a lock.
+
+    rate  samples per second that this machine draws now; None before the first picture
+    """
+
+    state: str = "starting"
+    trouble: str | None = None
+    drawing: Drawing | None = None
+    rate: float | None = None
+    revision: int = 0
+    queued: int = 0
+
+
+class Readers:
+    """Read-only connections, lent to one thread at a time."""
+
+    def __init__(self, data: Path):
+        self.data = data
+        self.free: LifoQueue[Store] = LifoQueue(READERS)
+
+    @contextlib.contextmanager
+    def lend(self) -> Iterator[Store]:
+        try:
+            store = self.free.get_nowait()
+        except Exception:  # queue.Empty
+            store = Store.read(self.data)
+            store.connection.pragma("cache_size", -READER_CACHE_KIB)
+        try:
+            yield store
+        except DartboardError:
+            self._give_back(store)
+            raise
+        except BaseException:
+            store.close()
+            raise
+        self._give_back(store)
+
+    def _give_back(self, store: Store) -> None:
+        try:
+            self.free.put_nowait(store)
+        except Exception:  # queue.Full
+            store.close()
+
+    def close(self) -> None:
+        while not self.free.empty():
+            self.free.get_nowait().close()
+
+
+class Engine:
+    """
+    One per server. ``start`` returns when the database is open, ``stop`` when nothing of it is left.
+
+    on_change  called from the engine's thread whenever ``moment`` is another: quick, and thread-safe
+    """
+
+    def __init__(self, data: Path, device: Device, on_change: Callable[[], None] = lambda: None):
+        self.artifacts = Artifacts(data)
+        self.device, self.on_change = device, on_change
+        self.readers = Readers(self.artifacts.data)
+        self.moment = Moment()
+        self.machine = platform.node()
+        self.started_at = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+        self.stopping = threading.Event()
+        self.wanted = threading.Event()  # something to do while it is stalled
+        self.dispatcher: Dispatcher | None = None
+        self.waiting: list[tuple[Change[Any], Future[Any]]] = []
+        self.lock = threading.Lock()
+        self.opened: Future[None] = Future()
+        self.thread = threading.Thread(target=self._run, name="engine", daemon=True)
+        self.cleaned = 0.0
+
+    def start(self) -> None:
+        """Raises ``DataDirectoryProblem`` if the data directory cannot be opened."""
+        self.thread.start()
+        self.opened.result()
+
+    def stop(self) -> None:
+        """End the render process and the thread; what is finished is kept, what is drawn goes back to the queue."""
+        self.stopping.set()
+        self.wanted.set()
+        dispatcher = self.dispatcher
+        if dispatcher is not None:
+            dispatcher.stop()
+        self.thread.join()
+        self.readers.close()
+
+    def do(self, change: Change[T]) -> T:
+        """
+        Have ``change(store, dispatcher)`` done by the engine's thread; its result, or its error.
+
+        Raises ``EnvironmentProblem`` if the engine does not come round to it.
+        """
+        future: Future[T] = Future()
+        with self.lock:
+            self.waiting.append((change, future))
+            dispatcher = self.dispatcher
+        self.wanted.set()
+        if dispatcher is not None:
+            dispatcher.ask(self._serve)
+        try:
+            return future.result(CHANGE_SECONDS)
+        except TimeoutError:
+            future.cancel()
+            raise EnvironmentProblem(
+                f"the server did not come round to this in {CHANGE_SECONDS:.0f} s; it is busy or stalled: "
+                f"{self.moment.trouble or 'try again'}"
+            ) from None
+
+    # -- in the engine's thread ----------------------------------------------------------------------------------------
+
+    def _run(self) -> None:
+        try:
+            self.artifacts.prepare()
+            store = Store.open(self.artifacts.data)
+        except BaseException as error:
+            self.opened.set_exception(error)
+            return
+        try:
+            queue.recover(store)
+            self._clean(store)
+            self._change(state="idle", revision=store.revision(), queued=int(store.value("open_cells")))
+            self.opened.set_result(None)
+            while not self.stopping.is_set():
+                self._work(store)
+        finally:
+            store.close()
+
+    def _work(self, store: Store) -> None:
+        """Dispatch until the end, or until something stalls it."""
+        executor = LocalExecutor(
+            self.device, kernels=usable_kernel_caches(self.artifacts.data), logs=self.artifacts.logs,
+            cwd=self.artifacts.empty,
+        )  # fmt: skip
+        dispatcher = Dispatcher(
+            store, self.artifacts, executor, machine=self.machine, device=self.device.name, forever=True,
+            on_news=lambda news: self._hear(store, news), on_turn=lambda: self._turn(store),
+        )  # fmt: skip
+        self.serving = (store, dispatcher)
+        with self.lock:
+            self.dispatcher = dispatcher
+        try:
+            self._serve()
+            if not self.stopping.is_set():
+                dispatcher.run()
+        except DartboardError as error:
+            self._stall(error)
+        except Exception as error:  # a bug of ours must not leave a server that looks alive and does nothing
+            log.exception("the engine stumbled")
+            self._stall(error)
+        finally:
+            with self.lock:
+                self.dispatcher = None
+            executor.close()
+        if self.moment.trouble and not self.stopping.is_set():
+            self.wanted.clear()
+            self.wanted.wait(RETRY_SECONDS)
+            with contextlib.suppress(DartboardError):
+                queue.recover(store)
+
+    def _stall(self, error: Exception) -> None:
+        log.warning("rendering has stalled: %s", error)
+        self._change(state="stalled", trouble=str(error) or type(error).__name__, drawing=None)
+
+    def _serve(self) -> None:
+        """Do what routes asked for."""
+        while True:
+            with self.lock:
+                if not self.waiting:
+                    return
+                change, future = self.waiting.pop(0)
+            if not future.set_running_or_notify_cancel():
+                continue
+            store, dispatcher = self.serving
+            try:
+                future.set_result(change(store, dispatcher))
+            except BaseException as error:
+                future.set_exception(error)
+            self._look(store)
+
+    def _turn(self, store: Store) -> None:
+        """Between two events: has something changed that no news tells?"""
+        if time.monotonic() - self.cleaned > CLEANING_SECONDS:
+            self._clean(store)
+        self._look(store)
+
+    def _look(self, store: Store) -> None:
+        revision = store.revision()
+        if revision != self.moment.revision:
+            queued = int(store.value("open_cells"))
+            drawing = self.moment.drawing if self.dispatcher and self.dispatcher.under_way else None
+            self._change(revision=revision, queued=queued, drawing=drawing, state=self._state(drawing))
+
+    def _clean(self, store: Store) -> None:
+        self.cleaned = time.monotonic()
+        trash.empty(store, self.artifacts)
+
+    def _hear(self, store: Store, news: News) -> None:
+        """News of the dispatcher as a new moment."""
+        drawing, rate = self.moment.drawing, self.moment.rate
+        match news.event:
+            case Passed() as passed:
+                if drawing is None or drawing.cell != news.work.cell_id:
+                    drawing = self._drawing(store, news)
+                drawing = replace(
+                    drawing, role=passed.role, replicate=passed.k, done=passed.done, passes=passed.passes,
+                    seconds=passed.seconds, preview=passed.preview,
+                )  # fmt: skip
+            case Finished() as finished:
+                width, height = news.work.spec.estimand.size
+                seconds = finished.render_seconds + finished.compile_seconds
+                now = width * height * news.work.spec.spp / max(seconds, 1e-3)
+                rate = now if rate is None else 1 / (MEMORY / rate + (1 - MEMORY) / now)
+                drawing = drawing or self._drawing(store, news)
+            case Failed() as failed:
+                log.warning("%s: %s", failed.error_class, failed.message)
+                drawing = None
+            case _ if news.kind == "started":
+                drawing = self._drawing(store, news)
+            case _:
+                drawing = None
+        if news.event.__class__ is Passed:
+            self._change(drawing=drawing, trouble=None, state=self._state(drawing))
+        else:
+            self._change(
+                drawing=drawing, rate=rate, trouble=None, state=self._state(drawing), revision=store.revision(),
+                queued=int(store.value("open_cells")),
+            )  # fmt: skip
+
+    def _state(self, drawing: Drawing | None) -> str:
+        if drawing is not None:
+            return "rendering"
+        return "starting" if self.dispatcher and self.dispatcher.under_way else "idle"
+
+    def _drawing(self, store: Store, news: News) -> Drawing:
+        wanted = store.rows("experiments_of_cell", cell_id=news.work.cell_id)
+        where = wanted[0] if wanted else {"scene": "", "integrator": "", "sampler": ""}
+        role, replicate = news.work.missing[0]
+        description = f"{where['scene']} · {where['integrator']} · {where['sampler']} · {news.work.spec.spp} spp"
+        return Drawing(
+            news.work.cell_id, role, replicate, description, tuple(dict.fromkeys(row["id"] for row in wanted))
+        )
+
+    def _change(self, **values: Any) -> None:
+        self.moment = replace(self.moment, **values)
+        self.on_change()
+
+
+def seconds_left(store: Store, experiment: int, rate: float | None) -> float | None:
+    """How long an experiment still takes on this machine; None if nothing is left or nothing was ever timed."""
+    samples = store.value("samples_left", experiment_id=experiment)
+    if not samples:
+        return None
+    rate = rate or max(experiments.rates(store, platform.node()).values(), default=0.0)
+    return samples / rate if rate else None

@@ -1,0 +1,169 @@
+"""
+Pictures of cells for browsers: previews, error maps, float16 rows. Made when asked for, the last ones kept in memory.
+
+A finished replicate never changes, so whatever is made of it may be kept for ever; a picture that is still being drawn
+is read from the small file that its render process writes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from jobs.artifacts import Artifacts
+from jobs.errors import NotFound
+from jobs.store import Row, Store
+from renderer.errors import BadParameter, UnknownName
+from renderer.images import read_picture
+from renderer.metrics import METRICS, Reference
+from renderer.previews import error_png, preview_png, shrink, to_half
+
+T = TypeVar("T", bytes, NDArray[np.float32])
+Floats = NDArray[np.float32]
+
+SIZES = (64, 128, 256, 512)  # pixels of a preview's longer side: few, so that pages share them
+KEPT_PNG_BYTES = 2**25  # some hundred previews
+KEPT_PICTURE_BYTES = 2**27  # an image grid asks for many parts of one reference
+MEAN = "mean"  # in place of a replicate's number: the mean of all of them
+
+
+class Cache:
+    """Values by key, the least used dropped when all of them have more than ``limit`` bytes. For any thread."""
+
+    def __init__(self, limit: int):
+        self.limit, self.bytes = limit, 0
+        self.held: OrderedDict[object, bytes | Floats] = OrderedDict()
+        self.lock = threading.Lock()
+
+    def get(self, key: object, make: Callable[[], T]) -> T:
+        """The value of ``key``; two threads that miss it at once both make it."""
+        with self.lock:
+            if key in self.held:
+                self.held.move_to_end(key)
+                return self.held[key]  # type: ignore[return-value]
+        value = make()
+        with self.lock:
+            if key not in self.held:
+                self.held[key] = value
+                self.bytes += _size(value)
+                while self.bytes > self.limit and len(self.held) > 1:
+                    self.bytes -= _size(self.held.popitem(last=False)[1])
+        return value
+
+
+class Pictures:
+    """The pictures of one data directory."""
+
+    def __init__(self, artifacts: Artifacts):
+        self.artifacts = artifacts
+        self.png, self.decoded = Cache(KEPT_PNG_BYTES), Cache(KEPT_PICTURE_BYTES)
+
+    def preview(
+        self, store: Store, cell: int, role: str, k: str, *, size: int, ev: float, tone: str, maximum: float
+    ) -> tuple[bytes, bool]:
+        """
+        A tone-mapped PNG, and whether it is final. Of a replicate that is not finished, what is drawn so far.
+
+        Raises ``NotFound`` while there is nothing to see.
+        """
+        _check_size(size)
+        try:
+            names = self._names(store, cell, role, k)
+        except NotFound:
+            partial = self._partial(store, cell)
+            if partial is None:
+                raise
+            return preview_png(shrink(partial, size), ev=ev, tone=tone, maximum=maximum), False
+        key = (names, size, ev, tone, maximum)
+        return self.png.get(
+            key, lambda: preview_png(self._shrunk(names, size), ev=ev, tone=tone, maximum=maximum)
+        ), k != MEAN  # fmt: skip
+
+    def error(
+        self, store: Store, cell: int, metric: str, reference: int, k: str, *, size: int, maximum: float
+    ) -> bytes:
+        """The map of a metric as a PNG, from 0 to ``maximum``. Raises ``NotFound`` while nothing can be compared."""
+        if metric not in METRICS:
+            raise UnknownName("metric", metric, "", METRICS)
+        _check_size(size)
+        names = self._names(store, cell, "cell", k)
+        halves = [tuple(row["image"] for row in self._rows(store, reference, "reference")[part::2]) for part in (0, 1)]
+        if not all(halves):
+            raise NotFound(f"reference {reference} is not finished yet; there is nothing to compare with")
+
+        def make() -> bytes:
+            against = Reference(self._mean(halves[0]), self._mean(halves[1]))
+            picture = self._mean(names)
+            if picture.shape != against.first.shape:
+                raise BadParameter(f"cell {cell} and reference {reference} differ in size: nothing can be compared")
+            return error_png(shrink(METRICS[metric].error_map(picture, against), size), maximum)
+
+        return self.png.get((names, metric, *halves, size, maximum), make)
+
+    def pixels(self, store: Store, cell: int, role: str, k: str, size: int | None) -> tuple[int, int, bytes]:
+        """Width, height and float16 RGB rows from the top."""
+        names = self._names(store, cell, role, k)
+        picture = self._mean(names) if size is None else self._shrunk(names, size)
+        return picture.shape[1], picture.shape[0], to_half(picture).tobytes()
+
+    def file(self, store: Store, cell: int, role: str, k: int) -> str:
+        """The EXR file of a replicate, relative to the data directory."""
+        return self._names(store, cell, role, str(k))[0]
+
+    def _names(self, store: Store, cell: int, role: str, k: str) -> tuple[str, ...]:
+        """The files of one replicate, or of all of them."""
+        rows = self._rows(store, cell, role)
+        if k != MEAN and not k.isdecimal():
+            raise BadParameter(f"k = {k[:20]!r} is not allowed; give the number of a replicate, or {MEAN}")
+        names = tuple(row["image"] for row in rows if k == MEAN or row["k"] == int(k))
+        if not names:
+            known = store.one("cell_by_id", id=cell)
+            if known is None:
+                raise NotFound(f"there is no cell {cell}")
+            which = "no picture" if k == MEAN else f"no picture {k}"
+            raise NotFound(f"cell {cell} has {which} of role {role!r} yet; it is {known['state']}")
+        return names
+
+    def _rows(self, store: Store, cell: int, role: str) -> list[Row]:
+        return store.rows("images", cell_id=cell, role=role)
+
+    def _shrunk(self, names: tuple[str, ...], size: int) -> Floats:
+        return self.decoded.get((names, size), lambda: np.asarray(shrink(self._mean(names), size), np.float32))
+
+    def _mean(self, names: Sequence[str]) -> Floats:
+        """The mean of pictures, float32."""
+
+        def make() -> Floats:
+            total = read_picture(self.artifacts.path(names[0]))
+            if len(names) == 1:
+                return total
+            whole = total.astype(np.float64)
+            for name in names[1:]:
+                whole += read_picture(self.artifacts.path(name))
+            return np.asarray(whole / len(names), np.float32)
+
+        return self.decoded.get(tuple(names), make)
+
+    def _partial(self, store: Store, cell: int) -> Floats | None:
+        """What a render process has drawn so far of a cell, None where it shows nothing yet."""
+        known = store.one("cell_by_id", id=cell)
+        with contextlib.suppress(OSError, ValueError, EOFError):
+            if known is not None:
+                loaded = np.load(self.artifacts.preview(known["digest"]), allow_pickle=False)
+                return np.asarray(loaded, np.float32)
+        return None
+
+
+def _check_size(size: int) -> None:
+    if size not in SIZES:
+        raise BadParameter(f"size = {size} is not allowed; give one of {', '.join(map(str, SIZES))}")
+
+
+def _size(value: bytes | Floats) -> int:
+    return len(value) if isinstance(value, bytes) else value.nbytes

@@ -1,0 +1,122 @@
+"""
+Problem documents: every error of the service in one shape (RFC 9457), with the sentence that the command line prints.
+
+A ``DartboardError`` is a sentence already; its class decides the status. Anything else is a bug of ours: logged with
+its traceback, told without.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Sequence
+from http import HTTPStatus
+from typing import Any
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from pydantic import ValidationError
+from starlette.exceptions import HTTPException
+
+from jobs.errors import Conflict, DataDirectoryProblem, GridError, NotFound, WasDeleted
+from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, SceneError, UnknownName
+from service.schemas import Fault, Problem
+
+MEDIA_TYPE = "application/problem+json"
+# The first class that fits counts.
+KINDS: Sequence[tuple[type[DartboardError], str, str, int]] = (
+    (WasDeleted, "experiment-deleted", "the experiment was deleted", 404),
+    (NotFound, "not-found", "there is no such thing", 404),
+    (Conflict, "conflict", "that does not fit the state of things", 409),
+    (GridError, "bad-grid", "the grid cannot be run", 422),
+    (SceneError, "bad-scene", "the scene cannot be used", 422),
+    (UnknownName, "unknown-name", "the catalog knows no such name", 422),
+    (BadParameter, "bad-value", "a value is not allowed", 422),
+    (DataDirectoryProblem, "data-directory", "the data directory cannot be used", 507),
+    (EnvironmentProblem, "environment", "the machine lacks something", 503),
+    (DartboardError, "bad-request", "the request cannot be used", 422),
+)
+RESPONSES: dict[int | str, dict[str, Any]] = {
+    status: {"description": text, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
+    for status, text in ((404, "unknown"), (422, "bad value"), (503, "the machine lacks something"))
+}
+
+log = logging.getLogger("dartboard")
+
+
+class TooLarge(DartboardError):
+    """A body over a stated limit."""
+
+
+def problem(
+    request: Request, name: str, title: str, status: int, detail: str, faults: Sequence[Fault] = ()
+) -> JSONResponse:
+    """One problem document."""
+    body = Problem(
+        type=f"urn:dartboard:{name}", title=title, status=status, detail=detail, instance=request.url.path,
+        problems=list(faults),
+    )  # fmt: skip
+    return JSONResponse(body.model_dump(), status, media_type=MEDIA_TYPE)
+
+
+def of_error(request: Request, error: DartboardError) -> JSONResponse:
+    """The document of one of our own errors."""
+    if isinstance(error, TooLarge):
+        return problem(request, "too-large", "the request is too large", 413, str(error))
+    name, title, status = next((name, title, status) for kind, name, title, status in KINDS if isinstance(error, kind))
+    faults = [Fault(detail=text, field=field_of(text)) for text in getattr(error, "problems", ())]
+    return problem(request, name, title, status, str(error), faults)
+
+
+def field_of(sentence: str) -> str | None:
+    """The key of a grid that a sentence of ``jobs/grid.py`` is about, from the place that it names."""
+    named = re.search(r"\[(scene|reference)\b", sentence)
+    keyed = re.search(
+        r"\b(name|scenes|samplers|integrators|spp|replicates|resolution|crop|max_depth|rfilter|colour|reference)"
+        r"(\[\d+\])?( of |: | is | asks )",
+        sentence,
+    )
+    found = named or keyed or re.search(r"in (samplers|integrators|rfilter)\b", sentence)
+    return found[1] if found else None
+
+
+def install(app: FastAPI) -> None:
+    """Have every error of an application come out as a problem document."""
+
+    @app.exception_handler(DartboardError)
+    async def ours(request: Request, error: DartboardError) -> JSONResponse:
+        return of_error(request, error)
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid(request: Request, error: RequestValidationError) -> JSONResponse:
+        return problem(request, "bad-request", "the request cannot be used", 422, sentences(error.errors()))
+
+    @app.exception_handler(HTTPException)
+    async def http(request: Request, error: HTTPException) -> JSONResponse:
+        title = HTTPStatus(error.status_code).phrase.lower()
+        name = title.replace(" ", "-")
+        answer = problem(request, name, title, error.status_code, f"{request.method} {request.url.path}: {title}")
+        answer.headers.update(error.headers or {})
+        return answer
+
+    @app.exception_handler(Exception)
+    async def bug(request: Request, error: Exception) -> JSONResponse:
+        log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+        detail = f"Dartboard has a bug: {type(error).__name__} (the server's log has more); nothing was lost"
+        return problem(request, "bug", "internal error", 500, detail)
+
+
+def sentences(errors: Sequence[Any]) -> str:
+    """What pydantic found, in words."""
+    found = []
+    for error in errors:
+        place = ".".join(str(part) for part in error["loc"] if part not in ("body", "query", "path"))
+        message = error["msg"][:1].lower() + error["msg"][1:]
+        found.append(f"{place}: {message}" if place else message)
+    return "; ".join(found)
+
+
+def of_model(error: ValidationError) -> DartboardError:
+    """A body that does not fit its model."""
+    return DartboardError(f"the body is no submission: {sentences(error.errors(include_url=False))}")

@@ -1,0 +1,129 @@
+"""
+Scenes that come over the wire: a zip of a scene's folder, unpacked with suspicion, vetted, and kept by digest.
+
+Only regular files with an extension that a scene may have are unpacked, under names that stay inside the folder, and
+no more bytes than allowed are ever written, whatever the archive claims. Then the scene is read like any other
+(renderer/scenes/vet.py); what it does not refer to is not kept.
+"""
+
+from __future__ import annotations
+
+import stat
+import tempfile
+import zipfile
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+from typing import IO
+
+from jobs.artifacts import Artifacts
+from jobs.store import Store
+from renderer.errors import SceneError, UnknownName, shown
+from renderer.scenes import sources
+from renderer.scenes.allowed import EXTENSIONS, file_fault
+from renderer.scenes.builtin import BUILTIN
+from renderer.scenes.sources import SceneSource
+from service.engine import Engine
+from service.problems import TooLarge
+
+MAX_FILES = 2000  # in an archive
+MAX_BYTES = 2**29  # unpacked
+MAX_NAME = 200  # characters
+
+
+def receive(engine: Engine, archive: IO[bytes], name: str, main: str | None) -> SceneSource:
+    """
+    Vet the scene in a zip file and keep a snapshot of it.
+
+    name  what people call it; main  its XML file, where the folder holds several
+    Raises ``SceneError`` with the reasons, ``TooLarge`` over a limit.
+    """
+    _check_name(name)
+    with tempfile.TemporaryDirectory(prefix="upload-", dir=engine.artifacts.work) as folder:
+        root = Path(folder)
+        _unpack(archive, root, name)
+        try:
+            source = replace(sources.find(main or ".", _without_wrapper(root)), name=name)
+        except SceneError as error:
+            raise SceneError(str(error).replace(str(root), "the archive").replace("'.'", shown(name))) from None
+        sources.snapshot(source, engine.artifacts.scenes)
+    engine.do(lambda store, _: remember(store, source))
+    return source
+
+
+def remember(store: Store, source: SceneSource) -> None:
+    """Note a scene whose snapshot is kept. In the engine's thread."""
+    store.run("add_scene", digest=source.digest, name=source.name, main=source.main, builtin=source.builtin)
+
+
+def find(store: Store, artifacts: Artifacts, uploaded: dict[str, str], name: str) -> SceneSource:
+    """
+    The scene that a grid from outside names: built in, or uploaded. Never a path of this machine.
+
+    Raises ``UnknownName`` or ``SceneError``.
+    """
+    if name in uploaded:
+        row = store.one("scene_by_digest", digest=uploaded[name])
+        if row is None or not artifacts.scene_folder(row["digest"]).is_dir():
+            raise SceneError(
+                f"scene {shown(name)}: there is no uploaded scene {shown(uploaded[name])}; upload it again"
+            )
+        return sources.kept(name, artifacts.scene_folder(row["digest"]), row["main"])
+    if name in BUILTIN:
+        return sources.find(name, Path())
+    raise UnknownName("scene", name, "", [*BUILTIN, *uploaded])
+
+
+def _check_name(name: str) -> None:
+    if not name.strip() or len(name) > MAX_NAME or not name.isprintable():
+        raise SceneError(f"the name {shown(name)} is not allowed; give 1 to {MAX_NAME} printable characters")
+
+
+def _unpack(archive: IO[bytes], root: Path, name: str) -> None:
+    try:
+        with zipfile.ZipFile(archive) as opened:
+            entries = [entry for entry in opened.infolist() if not entry.is_dir()]
+            if len(entries) > MAX_FILES:
+                raise TooLarge(f"the archive of {shown(name)} has {len(entries)} files, more than {MAX_FILES}")
+            left = MAX_BYTES
+            for entry in entries:
+                fault = _fault(entry)
+                if fault:
+                    raise SceneError(f"the archive of {shown(name)} is refused: {shown(entry.filename)} {fault}")
+                left = _write(opened, entry, root / entry.filename, left, name)
+    except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
+        raise SceneError(f"the archive of {shown(name)} cannot be read ({error}); send a zip of the folder") from None
+
+
+def _fault(entry: zipfile.ZipInfo) -> str | None:
+    """Why a file of an archive is refused, or None."""
+    kind = stat.S_IFMT(entry.external_attr >> 16)
+    if kind not in (0, stat.S_IFREG):
+        return "is no regular file (a link or a device); put the file itself there"
+    if entry.flag_bits & 0x1:
+        return "is encrypted; send it without a password"
+    if fault := file_fault(entry.filename):
+        return fault
+    suffix = PurePosixPath(entry.filename).suffix.lower()
+    if suffix != ".xml" and suffix not in EXTENSIONS:
+        return f"has an extension that no scene needs; allowed: .xml {' '.join(sorted(EXTENSIONS))}"
+    return None
+
+
+def _write(opened: zipfile.ZipFile, entry: zipfile.ZipInfo, to: Path, left: int, name: str) -> int:
+    """Unpack one file, no more than ``left`` bytes; how many are left after it."""
+    if to.exists():
+        raise SceneError(f"the archive of {shown(name)} holds {shown(entry.filename)} twice; pack it anew")
+    to.parent.mkdir(parents=True, exist_ok=True)
+    with opened.open(entry) as packed, to.open("xb") as file:
+        while block := packed.read(2**16):
+            left -= len(block)
+            if left < 0:
+                raise TooLarge(f"the archive of {shown(name)} unpacks to more than {MAX_BYTES >> 20} MiB")
+            file.write(block)
+    return left
+
+
+def _without_wrapper(root: Path) -> Path:
+    """A zip made of a folder holds that folder: what counts is what is in it."""
+    inside = list(root.iterdir())
+    return inside[0] if len(inside) == 1 and inside[0].is_dir() else root

@@ -1,0 +1,126 @@
+"""
+What the database and the engine know, in the words of the wire. Routes, streams and reports read here, so that two of
+them cannot tell different things.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from jobs import cells, convergence, experiments
+from jobs.experiments import Experiment
+from jobs.gridtoml import toml_of
+from jobs.store import Store
+from renderer import catalog
+from renderer.metrics import METRICS
+from renderer.spec import Choice
+from service import schemas
+from service.engine import Engine, Moment, seconds_left
+
+DEFAULT_METRICS = ("relmse", "mse_cross", "mse")  # the first that has values
+
+
+def experiment(store: Store, found: Experiment, rate: float | None) -> dict[str, Any]:
+    """``schemas.Experiment``: an experiment and how far it is."""
+    standing = experiments.standing(store, found.id)
+    return {
+        "id": found.id, "name": found.name, "state": standing.state, "created_at": found.created_at,
+        "cells": standing.cells, "references": standing.references, "had": standing.had, "wanted": standing.wanted,
+        "failed": standing.failed,
+        "seconds_left": None if standing.finished else seconds_left(store, found.id, rate),
+    }  # fmt: skip
+
+
+def all_experiments(store: Store, rate: float | None) -> list[dict[str, Any]]:
+    """Newest first."""
+    return [experiment(store, found, rate) for found in reversed(experiments.everything(store))]
+
+
+def detail(store: Store, found: Experiment, rate: float | None) -> schemas.ExperimentDetail:
+    """An experiment with its axes."""
+    revision = store.revision()
+    grid = json.loads(found.grid)
+    scenes = [
+        schemas.SceneInfo(
+            name=scene["name"], width=(scene["crop"] or [0, 0, scene["width"]])[2],
+            height=(scene["crop"] or [0, 0, 0, scene["height"]])[3], reference=_reference(scene["reference"]),
+        )
+        for scene in grid["scenes"]
+    ]  # fmt: skip
+    uploaded = {
+        scene["name"]: scene["digest"]
+        for scene in grid["scenes"]
+        if not (store.one("scene_by_digest", digest=scene["digest"]) or {}).get("builtin")
+    }
+    return schemas.ExperimentDetail(
+        **experiment(store, found, rate), revision=revision, scenes=scenes,
+        integrators=[_label("integrator", item) for item in grid["integrators"]],
+        samplers=[_label("sampler", item) for item in grid["samplers"]], spp=grid["spp"], sweeps={},
+        replicates=grid["replicates"], metrics=[metric_info(name) for name in METRICS],
+        default_metric=default_metric(store, found.id), toml=toml_of(grid), paths=uploaded,
+    )  # fmt: skip
+
+
+def default_metric(store: Store, experiment: int) -> str:
+    """What an experiment is shown by, if nobody says otherwise."""
+    there = {row["name"] for row in store.rows("measured_names", experiment_id=experiment)}
+    return next((name for name in DEFAULT_METRICS if name in there), DEFAULT_METRICS[0])
+
+
+def metric_info(name: str) -> schemas.MetricInfo:
+    metric = METRICS[name]
+    return schemas.MetricInfo(
+        name=name, line=metric.line, formula=metric.formula, epsilon=metric.epsilon,
+        lower_is_better=metric.lower_is_better,
+    )  # fmt: skip
+
+
+def curves(store: Store, experiment: int, metric: str, scene: str | None = None) -> dict[str, Any]:
+    """``schemas.Convergence``, as plain values: validating 10 000 points would take longer than finding them."""
+    revision = store.revision()
+    found = convergence.curves(store, experiment, metric, scene)
+    return {
+        "metric": metric_info(metric).model_dump(),
+        "revision": revision,
+        "series": [{**vars(series), "slope": series.slope and vars(series.slope)} for series in found],
+    }
+
+
+def worker(engine: Engine, moment: Moment) -> dict[str, Any]:
+    """``schemas.Worker``."""
+    drawing = moment.drawing
+    return {
+        "state": moment.state, "device": engine.device.description, "trouble": moment.trouble,
+        "experiment": drawing.experiments[0] if drawing and drawing.experiments else None,
+        "cell": drawing.cell if drawing else None, "description": drawing.description if drawing else None,
+        "queued": moment.queued,
+    }  # fmt: skip
+
+
+def update(store: Store, found: Experiment, after: int, engine: Engine, moment: Moment) -> dict[str, Any]:
+    """``schemas.Update``: what is new of an experiment since a revision."""
+    reload = cells.touched(store, found.id, after)
+    page = None if reload else cells.page(store, found.id, after=after, limit=cells.PAGE)
+    too_many = page is not None and page.next is not None
+    return {
+        "revision": moment.revision, "experiment": experiment(store, found, moment.rate),
+        "worker": worker(engine, moment),
+        "reload": reload or too_many, "cells": [] if page is None or too_many else page.cells,
+    }  # fmt: skip
+
+
+def to_json(value: Any) -> str:
+    """Compact JSON of plain values. Python's own is as fast as pydantic's here, and takes dicts as they are."""
+    return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def _reference(reference: dict[str, Any] | None) -> str | None:
+    if reference is None:
+        return None
+    sampler, integrator = _label("sampler", reference["sampler"]), _label("integrator", reference["integrator"])
+    return f"{integrator}, {sampler}, {reference['replicates']} × {reference['spp']} spp"
+
+
+def _label(axis: str, data: dict[str, Any]) -> str:
+    return catalog.label(axis, Choice.of(data))
