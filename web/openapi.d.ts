@@ -4,15 +4,18 @@
  */
 
 export interface paths {
-    "/x/Fault": {
+    "/api/health": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Fault_get"];
+        /**
+         * Health
+         * @description Whether the server works: `stalled` says that nothing is rendered until the trouble is over.
+         */
+        get: operations["health_api_health_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -21,15 +24,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Problem": {
+    "/api/worker": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Problem_get"];
+        /**
+         * Worker
+         * @description What renders, and what it does now.
+         */
+        get: operations["worker_api_worker_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -38,7 +44,81 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Submission": {
+    "/api/catalog": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Show Catalog
+         * @description Every sampler, integrator, scene, filter and metric with its parameters, defaults and units.
+         */
+        get: operations["show_catalog_api_catalog_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Experiments
+         * @description Every experiment with its state and progress, newest first.
+         */
+        get: operations["list_experiments_api_experiments_get"];
+        put?: never;
+        /**
+         * Submit
+         * @description Submit a grid: 201 for a new experiment, 200 for one that was there (a cancelled one is wanted again).
+         *
+         *     The body is a `Submission` as JSON, or the text of a grid file with `Content-Type: application/toml`. With
+         *     `dry_run` nothing is stored: the answer (200) says what the grid would render and cost. A client that is not sure
+         *     whether its request arrived sends it again with the same `Idempotency-Key`.
+         */
+        post: operations["submit_api_experiments_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Show
+         * @description One experiment with its axes, metrics and grid.
+         */
+        get: operations["show_api_experiments__experiment_id__get"];
+        put?: never;
+        post?: never;
+        /**
+         * Delete
+         * @description Delete an experiment and the cells that no other one has; `dry_run` says what would go.
+         *
+         *     It vanishes at once, and `restore` brings it back until `final_at`.
+         */
+        delete: operations["delete_api_experiments__experiment_id__delete"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/pause": {
         parameters: {
             query?: never;
             header?: never;
@@ -47,23 +127,111 @@ export interface paths {
         };
         get?: never;
         put?: never;
-        /** F */
-        post: operations["f_x_Submission_post"];
+        /**
+         * Pause
+         * @description Stop for a while, at once; the picture that is being drawn is begun again on resume.
+         */
+        post: operations["pause_api_experiments__experiment_id__pause_post"];
         delete?: never;
         options?: never;
         head?: never;
         patch?: never;
         trace?: never;
     };
-    "/x/Rounded": {
+    "/api/experiments/{experiment_id}/resume": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Rounded_get"];
+        get?: never;
+        put?: never;
+        /**
+         * Resume
+         * @description Go on after a pause.
+         */
+        post: operations["resume_api_experiments__experiment_id__resume_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/cancel": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Cancel
+         * @description Stop within seconds; what is finished is kept, and retry goes on.
+         */
+        post: operations["cancel_api_experiments__experiment_id__cancel_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/retry": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Retry
+         * @description Queue failed and cancelled cells again.
+         */
+        post: operations["retry_api_experiments__experiment_id__retry_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/restore": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Restore
+         * @description Take back a deletion; nothing happens to an experiment that is there.
+         */
+        post: operations["restore_api_experiments__experiment_id__restore_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/experiments/{experiment_id}/cells": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * List Cells
+         * @description Cells in the order of the plan, page by page; with `after`, those that changed since that revision.
+         *
+         *     A dashboard reads all pages once, keeps the revision of the first, and follows `events` from there.
+         */
+        get: operations["list_cells_api_experiments__experiment_id__cells_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -72,15 +240,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/DryRun": {
+    "/api/experiments/{experiment_id}/convergence": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_DryRun_get"];
+        /**
+         * Show Convergence
+         * @description The curves of a metric: error against spp and seconds, with 95 % intervals and slopes.
+         */
+        get: operations["show_convergence_api_experiments__experiment_id__convergence_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -89,15 +260,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Scene": {
+    "/api/experiments/{experiment_id}/results.csv": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Scene_get"];
+        /**
+         * Results Csv
+         * @description One row per replicate with every metric, as `dartboard results --format csv`.
+         */
+        get: operations["results_csv_api_experiments__experiment_id__results_csv_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -106,15 +280,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Experiment": {
+    "/api/experiments/{experiment_id}/results.json": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Experiment_get"];
+        /**
+         * Results Json
+         * @description The same as JSON.
+         */
+        get: operations["results_json_api_experiments__experiment_id__results_json_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -123,15 +300,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/SceneInfo": {
+    "/api/experiments/{experiment_id}/report": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_SceneInfo_get"];
+        /**
+         * Report
+         * @description The experiment as one HTML file that needs nothing else; `download` gives it a file name.
+         */
+        get: operations["report_api_experiments__experiment_id__report_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -140,15 +320,20 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/MetricInfo": {
+    "/api/cells/{cell}/preview.png": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_MetricInfo_get"];
+        /**
+         * Preview
+         * @description A picture as people see it: exposure `ev` in stops, `tone` srgb, gamma22 or falsecolour (0 to `max`).
+         *
+         *     While nothing is finished, what is drawn so far; 404 while there is nothing at all.
+         */
+        get: operations["preview_api_cells__cell__preview_png_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -157,15 +342,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/ExperimentDetail": {
+    "/api/cells/{cell}/error/{metric}.png": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_ExperimentDetail_get"];
+        /**
+         * Error Map
+         * @description Where the error is: the map whose mean is the metric, in inferno from 0 to `max`.
+         */
+        get: operations["error_map_api_cells__cell__error__metric__png_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -174,15 +362,20 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Deleted": {
+    "/api/cells/{cell}/pixels": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Deleted_get"];
+        /**
+         * Pixels
+         * @description Linear radiance as float16, little-endian RGB rows from the top; headers X-Width and X-Height.
+         *
+         *     Without `k`: the first replicate of a cell, the mean of a reference. `size` makes the longer side at most so long.
+         */
+        get: operations["pixels_api_cells__cell__pixels_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -191,15 +384,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Cell": {
+    "/api/cells/{cell}/image.exr": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Cell_get"];
+        /**
+         * Image
+         * @description A replicate as it was rendered: float32 OpenEXR, with all that is needed to make it again in its header.
+         */
+        get: operations["image_api_cells__cell__image_exr_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -208,15 +404,18 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Cells": {
+    "/api/cells/{cell}/attempts": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Cells_get"];
+        /**
+         * Attempts
+         * @description Every try at a cell, oldest first, with the last words of render processes that ended badly.
+         */
+        get: operations["attempts_api_cells__cell__attempts_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -225,15 +424,43 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Attempt": {
+    "/api/scenes": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Attempt_get"];
+        /**
+         * List Scenes
+         * @description The built-in scenes with what their files say about size, integrator and sampler.
+         */
+        get: operations["list_scenes_api_scenes_get"];
+        put?: never;
+        /**
+         * Upload
+         * @description Upload a scene: a zip of its folder, at most 64 MiB. It is vetted (only plugins that ship with Mitsuba, only files
+         *     of its own folder) and kept by its digest; a submission then says `"scenes": {NAME: digest}`.
+         */
+        post: operations["upload_api_scenes_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Follow All
+         * @description Events `update`, data `Overview`: every experiment and the worker, whenever something has changed.
+         */
+        get: operations["follow_all_api_events_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -242,168 +469,20 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/x/Attempts": {
+    "/api/experiments/{experiment_id}/events": {
         parameters: {
             query?: never;
             header?: never;
             path?: never;
             cookie?: never;
         };
-        /** <Lambda> */
-        get: operations["_lambda__x_Attempts_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Point": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Point_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Slope": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Slope_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Series": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Series_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Convergence": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Convergence_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Worker": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Worker_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Health": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Health_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Progress": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Progress_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Update": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Update_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/x/Overview": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /** <Lambda> */
-        get: operations["_lambda__x_Overview_get"];
+        /**
+         * Follow One
+         * @description Events of one experiment: `update` (data `Update`), `progress` (data `Progress`), `gone` when it was deleted.
+         *
+         *     It begins after the revision in the header `Last-Event-ID`, else in `after`, else now.
+         */
+        get: operations["follow_one_api_experiments__experiment_id__events_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -493,13 +572,15 @@ export interface components {
             /**
              * Reference
              * @description the cell that this one is measured against
+             * @default null
              */
-            reference?: number | null;
+            reference: number | null;
             /**
              * Seconds
              * @description mean render time of a replicate, without compiling
+             * @default null
              */
-            seconds?: number | null;
+            seconds: number | null;
             /**
              * Metrics
              * @default {}
@@ -511,10 +592,16 @@ export interface components {
                     number
                 ];
             };
-            /** Error Class */
-            error_class?: string | null;
-            /** Error */
-            error?: string | null;
+            /**
+             * Error Class
+             * @default null
+             */
+            error_class: string | null;
+            /**
+             * Error
+             * @default null
+             */
+            error: string | null;
         };
         /**
          * Cells
@@ -733,21 +820,6 @@ export interface components {
                 [key: string]: string;
             };
         };
-        /**
-         * Fault
-         * @description One thing that is wrong with a request. ``field`` is the grid's key that it concerns, where one can be told.
-         */
-        Fault: {
-            /** Detail */
-            detail: string;
-            /** Field */
-            field?: string | null;
-        };
-        /** HTTPValidationError */
-        HTTPValidationError: {
-            /** Detail */
-            detail?: components["schemas"]["ValidationError"][];
-        };
         /** Health */
         Health: {
             /**
@@ -783,17 +855,6 @@ export interface components {
             lower_is_better: boolean | null;
         };
         /**
-         * Overview
-         * @description Event ``update`` of the general stream: every experiment, newest first, and the worker.
-         */
-        Overview: {
-            /** Revision */
-            revision: number;
-            /** Experiments */
-            experiments: components["schemas"]["Experiment"][];
-            worker: components["schemas"]["Worker"];
-        };
-        /**
          * Point
          * @description Mean error over ``n`` replicates at the spp that was rendered; ``low`` to ``high`` is its 95 % interval.
          */
@@ -822,62 +883,6 @@ export interface components {
              * @description mean render time of a replicate
              */
             seconds: number | null;
-        };
-        /**
-         * Problem
-         * @description RFC 9457: what went wrong, in a sentence with the way out. ``problems`` lists every fault of a grid.
-         */
-        Problem: {
-            /**
-             * Type
-             * @example urn:dartboard:bad-grid
-             */
-            type: string;
-            /**
-             * Title
-             * @example the grid cannot be run
-             */
-            title: string;
-            /**
-             * Status
-             * @example 422
-             */
-            status: number;
-            /** Detail */
-            detail: string;
-            /**
-             * Instance
-             * @example /api/experiments
-             */
-            instance: string;
-            /**
-             * Problems
-             * @default []
-             */
-            problems: components["schemas"]["Fault"][];
-        };
-        /**
-         * Progress
-         * @description Event ``progress``: a picture that is being drawn. ``preview`` grows when there is a new preview to fetch.
-         */
-        Progress: {
-            /** Cell */
-            cell: number;
-            /**
-             * Role
-             * @enum {string}
-             */
-            role: "cell" | "reference";
-            /** Replicate */
-            replicate: number;
-            /** Done */
-            done: number;
-            /** Passes */
-            passes: number;
-            /** Seconds */
-            seconds: number;
-            /** Preview */
-            preview: number;
         };
         /**
          * Rounded
@@ -970,81 +975,6 @@ export interface components {
             high: number;
         };
         /**
-         * Submission
-         * @description A grid as an object, or as the text of a TOML file; one of the two. ``scenes`` says which uploaded scene
-         *     (``POST /api/scenes``) a name in the grid's ``scenes`` stands for; built-in scenes need no entry.
-         * @example {
-         *       "grid": {
-         *         "name": "first",
-         *         "samplers": [
-         *           "independent"
-         *         ],
-         *         "scenes": [
-         *           "cornell_box"
-         *         ],
-         *         "spp": [
-         *           4,
-         *           16
-         *         ]
-         *       }
-         *     }
-         * @example {
-         *       "scenes": {
-         *         "room": "0000000000000000000000000000000000000000000000000000000000000000"
-         *       },
-         *       "toml": "scenes = [\"room\"]\nspp = [16]\n"
-         *     }
-         */
-        Submission: {
-            /** Grid */
-            grid?: {
-                [key: string]: unknown;
-            } | null;
-            /** Toml */
-            toml?: string | null;
-            /**
-             * Origin
-             * @description what sentences call the grid: the name of its file
-             * @default grid
-             */
-            origin: string;
-            /**
-             * Scenes
-             * @default {}
-             */
-            scenes: {
-                [key: string]: string;
-            };
-        };
-        /**
-         * Update
-         * @description Event ``update`` of an experiment's stream: what changed since the event before. ``reload``: everything may have
-         *     changed (cancelled, paused, retried …); ask for all cells again.
-         */
-        Update: {
-            /** Revision */
-            revision: number;
-            experiment: components["schemas"]["Experiment"];
-            worker: components["schemas"]["Worker"];
-            /** Reload */
-            reload: boolean;
-            /** Cells */
-            cells: components["schemas"]["Cell"][];
-        };
-        /** ValidationError */
-        ValidationError: {
-            /** Location */
-            loc: (string | number)[];
-            /** Message */
-            msg: string;
-            /** Error Type */
-            type: string;
-            /** Input */
-            input?: unknown;
-            /** Context */
-            ctx?: Record<string, never>;
-        };
-        /**
          * Worker
          * @description What renders, and what it does now. ``state``: idle, starting, rendering, or stalled with its ``trouble``
          *     (a full disk, a renderer that does not start), which is tried again by itself.
@@ -1074,6 +1004,154 @@ export interface components {
              */
             queued: number;
         };
+        /**
+         * Submission
+         * @description A grid as an object, or as the text of a TOML file; one of the two. ``scenes`` says which uploaded scene
+         *     (``POST /api/scenes``) a name in the grid's ``scenes`` stands for; built-in scenes need no entry.
+         * @example {
+         *       "grid": {
+         *         "name": "first",
+         *         "samplers": [
+         *           "independent"
+         *         ],
+         *         "scenes": [
+         *           "cornell_box"
+         *         ],
+         *         "spp": [
+         *           4,
+         *           16
+         *         ]
+         *       }
+         *     }
+         * @example {
+         *       "scenes": {
+         *         "room": "0000000000000000000000000000000000000000000000000000000000000000"
+         *       },
+         *       "toml": "scenes = [\"room\"]\nspp = [16]\n"
+         *     }
+         */
+        Submission: {
+            /**
+             * Grid
+             * @default null
+             */
+            grid: {
+                [key: string]: unknown;
+            } | null;
+            /**
+             * Toml
+             * @default null
+             */
+            toml: string | null;
+            /**
+             * Origin
+             * @description what sentences call the grid: the name of its file
+             * @default grid
+             */
+            origin: string;
+            /**
+             * Scenes
+             * @default {}
+             */
+            scenes: {
+                [key: string]: string;
+            };
+        };
+        /**
+         * Fault
+         * @description One thing that is wrong with a request. ``field`` is the grid's key that it concerns, where one can be told.
+         */
+        Fault: {
+            /** Detail */
+            detail: string;
+            /**
+             * Field
+             * @default null
+             */
+            field: string | null;
+        };
+        /**
+         * Problem
+         * @description RFC 9457: what went wrong, in a sentence with the way out. ``problems`` lists every fault of a grid.
+         */
+        Problem: {
+            /**
+             * Type
+             * @example urn:dartboard:bad-grid
+             */
+            type: string;
+            /**
+             * Title
+             * @example the grid cannot be run
+             */
+            title: string;
+            /**
+             * Status
+             * @example 422
+             */
+            status: number;
+            /** Detail */
+            detail: string;
+            /**
+             * Instance
+             * @example /api/experiments
+             */
+            instance: string;
+            /**
+             * Problems
+             * @default []
+             */
+            problems: components["schemas"]["Fault"][];
+        };
+        /**
+         * Update
+         * @description Event ``update`` of an experiment's stream: what changed since the event before. ``reload``: everything may have
+         *     changed (cancelled, paused, retried …); ask for all cells again.
+         */
+        Update: {
+            /** Revision */
+            revision: number;
+            experiment: components["schemas"]["Experiment"];
+            worker: components["schemas"]["Worker"];
+            /** Reload */
+            reload: boolean;
+            /** Cells */
+            cells: components["schemas"]["Cell"][];
+        };
+        /**
+         * Overview
+         * @description Event ``update`` of the general stream: every experiment, newest first, and the worker.
+         */
+        Overview: {
+            /** Revision */
+            revision: number;
+            /** Experiments */
+            experiments: components["schemas"]["Experiment"][];
+            worker: components["schemas"]["Worker"];
+        };
+        /**
+         * Progress
+         * @description Event ``progress``: a picture that is being drawn. ``preview`` grows when there is a new preview to fetch.
+         */
+        Progress: {
+            /** Cell */
+            cell: number;
+            /**
+             * Role
+             * @enum {string}
+             */
+            role: "cell" | "reference";
+            /** Replicate */
+            replicate: number;
+            /** Done */
+            done: number;
+            /** Passes */
+            passes: number;
+            /** Seconds */
+            seconds: number;
+            /** Preview */
+            preview: number;
+        };
     };
     responses: never;
     parameters: never;
@@ -1083,420 +1161,7 @@ export interface components {
 }
 export type $defs = Record<string, never>;
 export interface operations {
-    _lambda__x_Fault_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Fault"];
-                };
-            };
-        };
-    };
-    _lambda__x_Problem_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Problem"];
-                };
-            };
-        };
-    };
-    f_x_Submission_post: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody: {
-            content: {
-                "application/json": components["schemas"]["Submission"];
-            };
-        };
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": unknown;
-                };
-            };
-            /** @description Validation Error */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["HTTPValidationError"];
-                };
-            };
-        };
-    };
-    _lambda__x_Rounded_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Rounded"];
-                };
-            };
-        };
-    };
-    _lambda__x_DryRun_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["DryRun"];
-                };
-            };
-        };
-    };
-    _lambda__x_Scene_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Scene"];
-                };
-            };
-        };
-    };
-    _lambda__x_Experiment_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Experiment"];
-                };
-            };
-        };
-    };
-    _lambda__x_SceneInfo_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["SceneInfo"];
-                };
-            };
-        };
-    };
-    _lambda__x_MetricInfo_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["MetricInfo"];
-                };
-            };
-        };
-    };
-    _lambda__x_ExperimentDetail_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["ExperimentDetail"];
-                };
-            };
-        };
-    };
-    _lambda__x_Deleted_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Deleted"];
-                };
-            };
-        };
-    };
-    _lambda__x_Cell_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Cell"];
-                };
-            };
-        };
-    };
-    _lambda__x_Cells_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Cells"];
-                };
-            };
-        };
-    };
-    _lambda__x_Attempt_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Attempt"];
-                };
-            };
-        };
-    };
-    _lambda__x_Attempts_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Attempts"];
-                };
-            };
-        };
-    };
-    _lambda__x_Point_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Point"];
-                };
-            };
-        };
-    };
-    _lambda__x_Slope_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Slope"];
-                };
-            };
-        };
-    };
-    _lambda__x_Series_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Series"];
-                };
-            };
-        };
-    };
-    _lambda__x_Convergence_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Convergence"];
-                };
-            };
-        };
-    };
-    _lambda__x_Worker_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["Worker"];
-                };
-            };
-        };
-    };
-    _lambda__x_Health_get: {
+    health_api_health_get: {
         parameters: {
             query?: never;
             header?: never;
@@ -1516,7 +1181,7 @@ export interface operations {
             };
         };
     };
-    _lambda__x_Progress_get: {
+    worker_api_worker_get: {
         parameters: {
             query?: never;
             header?: never;
@@ -1531,12 +1196,12 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Progress"];
+                    "application/json": components["schemas"]["Worker"];
                 };
             };
         };
     };
-    _lambda__x_Update_get: {
+    show_catalog_api_catalog_get: {
         parameters: {
             query?: never;
             header?: never;
@@ -1551,12 +1216,1020 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Update"];
+                    "application/json": {
+                        [key: string]: {
+                            [key: string]: unknown;
+                        }[];
+                    };
                 };
             };
         };
     };
-    _lambda__x_Overview_get: {
+    list_experiments_api_experiments_get: {
+        parameters: {
+            query?: {
+                /** @description only those of this name */
+                name?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"][];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    submit_api_experiments_post: {
+        parameters: {
+            query?: {
+                dry_run?: boolean;
+            };
+            header?: {
+                "idempotency-key"?: string | null;
+            };
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["Submission"];
+                /**
+                 * @example scenes = ["cornell_box"]
+                 *     samplers = ["independent", "stratified"]
+                 *     spp = [4, 16]
+                 */
+                "application/toml": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"] | components["schemas"]["DryRun"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    show_api_experiments__experiment_id__get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ExperimentDetail"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    delete_api_experiments__experiment_id__delete: {
+        parameters: {
+            query?: {
+                dry_run?: boolean;
+            };
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Deleted"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    pause_api_experiments__experiment_id__pause_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    resume_api_experiments__experiment_id__resume_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    cancel_api_experiments__experiment_id__cancel_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    retry_api_experiments__experiment_id__retry_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    restore_api_experiments__experiment_id__restore_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Experiment"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_cells_api_experiments__experiment_id__cells_get: {
+        parameters: {
+            query?: {
+                after?: number;
+                start?: number;
+                limit?: number;
+            };
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Cells"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    show_convergence_api_experiments__experiment_id__convergence_get: {
+        parameters: {
+            query?: {
+                metric?: string;
+                scene?: string | null;
+            };
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Convergence"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    results_csv_api_experiments__experiment_id__results_csv_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/csv": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    results_json_api_experiments__experiment_id__results_json_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    report_api_experiments__experiment_id__report_get: {
+        parameters: {
+            query?: {
+                download?: boolean;
+            };
+            header?: never;
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/html": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    preview_api_cells__cell__preview_png_get: {
+        parameters: {
+            query?: {
+                role?: "cell" | "reference";
+                /** @description the number of a replicate, or `mean` */
+                k?: string;
+                /** @description of the longer side, in pixels */
+                size?: "64" | "128" | "256" | "512";
+                ev?: number;
+                tone?: string;
+                /** @description what the top of a scale means */
+                max?: number;
+                /** @description ignored: makes a URL that a browser may keep */
+                v?: string;
+            };
+            header?: never;
+            path: {
+                /** @description of a cell */
+                cell: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the picture */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    error_map_api_cells__cell__error__metric__png_get: {
+        parameters: {
+            query: {
+                /** @description the cell that it is compared with */
+                reference: number;
+                /** @description the number of a replicate, or `mean` */
+                k?: string;
+                /** @description of the longer side, in pixels */
+                size?: "64" | "128" | "256" | "512";
+                /** @description what the top of a scale means */
+                max?: number;
+            };
+            header?: never;
+            path: {
+                /** @description of a cell */
+                cell: number;
+                metric: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the picture */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/png": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    pixels_api_cells__cell__pixels_get: {
+        parameters: {
+            query?: {
+                role?: "cell" | "reference";
+                /** @description the number of a replicate, or `mean` */
+                k?: string;
+                size?: number | null;
+                /** @description ignored: makes a URL that a browser may keep */
+                v?: string;
+            };
+            header?: never;
+            path: {
+                /** @description of a cell */
+                cell: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description float16 RGB rows */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    image_api_cells__cell__image_exr_get: {
+        parameters: {
+            query?: {
+                role?: "cell" | "reference";
+                k?: number;
+            };
+            header?: never;
+            path: {
+                /** @description of a cell */
+                cell: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description the picture */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "image/x-exr": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    attempts_api_cells__cell__attempts_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description of a cell */
+                cell: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Attempts"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    list_scenes_api_scenes_get: {
         parameters: {
             query?: never;
             header?: never;
@@ -1571,7 +2244,192 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/json": components["schemas"]["Overview"];
+                    "application/json": components["schemas"]["Scene"][];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    upload_api_scenes_post: {
+        parameters: {
+            query: {
+                /** @description what grids will call it */
+                name: string;
+                /** @description its XML file, where the folder has several */
+                main?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/zip": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Scene"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    follow_all_api_events_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description events */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/event-stream": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    follow_one_api_experiments__experiment_id__events_get: {
+        parameters: {
+            query?: {
+                /** @description the revision that the client has seen */
+                after?: number | null;
+            };
+            header?: {
+                "last-event-id"?: number | null;
+            };
+            path: {
+                /** @description of an experiment */
+                experiment_id: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description events */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/event-stream": unknown;
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
                 };
             };
         };
