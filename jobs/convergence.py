@@ -113,10 +113,15 @@ def _fit(x: Sequence[float], y: Sequence[float], weights: Sequence[float]) -> Sl
 
 
 def _point(row: Row) -> Row:
-    half = None if row["error"] is None else student(row["n"]) * row["error"]
-    mean = row["mean"]
+    mean, error, seconds = row["mean"], row["error"], row["seconds"]
+    half = None if error is None else student(row["n"]) * error
     return {
         "cell": row["cell"], "spp": row["spp"], "spp_actual": row["spp_actual"], "n": row["n"], "mean": mean,
-        "error": row["error"], "low": None if half is None else mean - half,
-        "high": None if half is None else mean + half, "seconds": row["seconds"],
+        "error": error, "low": None if half is None else _short(mean - half),
+        "high": None if half is None else _short(mean + half), "seconds": None if seconds is None else _short(seconds),
     }  # fmt: skip
+
+
+def _short(value: float) -> float:
+    """Six digits: what is derived for display need not travel with seventeen."""
+    return float(f"{value:.6g}")

@@ -71,7 +71,7 @@ def create(engine: Engine, hub: Hub, token: str | None = None) -> FastAPI:
     app.mount("/static", Assets(directory=WEB), name="static")
     for path in PAGES:
         app.get(path, include_in_schema=False)(_page)
-    app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=5, exclude_content_types=NOT_COMPRESSED)
+    app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=2, exclude_content_types=NOT_COMPRESSED)
     app.add_middleware(Guard, token=token)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app

@@ -339,7 +339,7 @@ select distinct name from point where experiment_id = :experiment_id;
 -- One row per cell and metric, in the order of the plan, with the mean time where it is known.
 select
     wanted.position, wanted.cell_id as cell, wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp,
-    cell.spp as spp_actual, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    cell.spp as spp_actual, case when instr(cell.spec, '"sweep":{}') = 0 then cell.spec ->> '$.estimand.sweep' end as sweep,
     point.name, point.n, point.mean, point.error, seconds.mean as seconds, seconds.conditions
 from experiment_cell as wanted
 cross join cell on cell.id = wanted.cell_id
@@ -359,7 +359,7 @@ order by wanted.position;
 -- name: cells_page
 select
     wanted.position, wanted.cell_id as cell, wanted.role, wanted.scene, wanted.integrator, wanted.sampler,
-    wanted.spp_asked as spp, cell.spp as spp_actual, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    wanted.spp_asked as spp, cell.spp as spp_actual, case when instr(cell.spec, '"sweep":{}') = 0 then cell.spec ->> '$.estimand.sweep' end as sweep,
     wanted.state, wanted.had, wanted.replicates as wanted, wanted.reference_id as reference,
     cell.error_class, cell.error,
     (select json_group_array(json_array(name, version, mean, error, n)) from point
@@ -371,7 +371,7 @@ order by wanted.position limit :limit;
 -- name: cells_changed
 select
     wanted.position, wanted.cell_id as cell, wanted.role, wanted.scene, wanted.integrator, wanted.sampler,
-    wanted.spp_asked as spp, cell.spp as spp_actual, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    wanted.spp_asked as spp, cell.spp as spp_actual, case when instr(cell.spec, '"sweep":{}') = 0 then cell.spec ->> '$.estimand.sweep' end as sweep,
     wanted.state, wanted.had, wanted.replicates as wanted, wanted.reference_id as reference,
     cell.error_class, cell.error,
     (select json_group_array(json_array(name, version, mean, error, n)) from point
@@ -415,7 +415,7 @@ with recursive count (k) as (
 )
 select
     experiment.name as experiment, wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp,
-    cell.spp as spp_actual, count.k as replicate, nullif(cell.spec ->> '$.estimand.sweep', '{}') as sweep,
+    cell.spp as spp_actual, count.k as replicate, case when instr(cell.spec, '"sweep":{}') = 0 then cell.spec ->> '$.estimand.sweep' end as sweep,
     replicate.id as replicate_id, replicate.render_seconds, replicate.compile_seconds,
     case when replicate.id is null then wanted.state else 'done' end as state
 from standing as wanted
