@@ -33,12 +33,12 @@ HubDep = Annotated[Hub, Depends(hub)]
 
 
 def store(engine: EngineDep) -> Iterator[Store]:
-    """A read-only connection, for the length of a request."""
+    """A read-only connection until the route has returned: a stream that lives for hours keeps none."""
     with engine.readers.lend() as lent:
         yield lent
 
 
-StoreDep = Annotated[Store, Depends(store)]
+StoreDep = Annotated[Store, Depends(store, scope="function")]
 ExperimentId = Annotated[int, Path(ge=1, le=LARGEST_ID, description="of an experiment")]
 CellId = Annotated[int, Path(ge=1, le=LARGEST_ID, description="of a cell")]
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
-from queue import LifoQueue
+from queue import Empty, Full, LifoQueue
 from typing import Any, TypeVar
 
 from jobs import experiments, queue, trash
@@ -86,7 +86,7 @@ class Readers:
     def lend(self) -> Iterator[Store]:
         try:
             store = self.free.get_nowait()
-        except Exception:  # queue.Empty
+        except Empty:
             store = Store.read(self.data)
             store.connection.pragma("cache_size", -READER_CACHE_KIB)
         try:
@@ -102,7 +102,7 @@ class Readers:
     def _give_back(self, store: Store) -> None:
         try:
             self.free.put_nowait(store)
-        except Exception:  # queue.Full
+        except Full:
             store.close()
 
     def close(self) -> None:
