@@ -1,20 +1,33 @@
-"""``dartboard cancel`` and ``retry``: through the owner's inbox where there is an owner, else as the owner."""
+"""
+``dartboard cancel``, ``retry``, ``pause`` and ``resume`` on a data directory: over HTTP where a server owns it, through
+the inbox where another process does, else as the owner.
+"""
 
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Literal
 
 from jobs import experiments, inbox, owner, queue
 from jobs.errors import DataDirectoryProblem
+from jobs.experiments import Experiment, Standing
 from jobs.store import Store
 
 ANSWER_SECONDS = 5.0  # an owner looks into its inbox several times a second
+Action = Literal["cancel", "retry", "pause", "resume"]
+DO: dict[Action, Callable[[Store, int], object]] = {
+    "cancel": queue.cancel,
+    "retry": queue.retry,
+    "pause": queue.pause,
+    "resume": queue.resume,
+}
 
 
-def change(what: str, name: str, data: Path) -> str:
+def change(what: Action, name: str, data: Path) -> str:
     """
-    Cancel or retry an experiment; a sentence about what was done.
+    Do one of DO to an experiment; a sentence about what was done.
 
     Raises ``NotFound`` for an unknown experiment, ``DataDirectoryProblem`` if the owner does not answer.
     """
@@ -22,25 +35,37 @@ def change(what: str, name: str, data: Path) -> str:
     experiment = experiments.find(store, name)
     store.close()
     who = owner.peek(data)
+    if who is not None and who.get("url"):
+        from service.remote import change_there
+
+        return change_there(what, str(experiment.id), who["url"])
     if who is not None:
         _ask_owner(what, experiment.id, data, who.get("pid"))
         return f"asked process {who.get('pid')}, which works on {data}, to {what} {experiment.name!r}"
     with owner.own(data):
         store = Store.open(data)
         queue.recover(store)
-        if what == "cancel":
-            queue.cancel(store, experiment.id)
-        else:
-            queue.retry(store, experiment.id)
+        done = DO[what](store, experiment.id)
         standing = experiments.standing(store, experiment.id)
         store.close()
-    if what == "cancel":
-        return f"{experiment.name!r} is cancelled; {standing.had} of {standing.wanted} pictures are kept"
+    return _told(what, experiment, standing, bool(done))
+
+
+def _told(what: Action, experiment: Experiment, standing: Standing, done: bool) -> str:
+    kept = f"{standing.had} of {standing.wanted} pictures are kept"
     left = standing.wanted - standing.had
+    if what == "cancel":
+        return f"{experiment.name!r} is cancelled; {kept}"
+    if what == "pause":
+        if standing.state != "paused":
+            return f"{experiment.name!r} is {standing.state}: there is nothing to pause"
+        return f"{experiment.name!r} is paused; {kept}; `dartboard resume {experiment.id}` goes on"
+    if what == "resume" and not done:
+        return f"{experiment.name!r} is {standing.state}: there is nothing to resume"
     return f"{left} pictures of {experiment.name!r} are queued again; `dartboard run` its grid to render them"
 
 
-def _ask_owner(what: str, experiment: int, data: Path, pid: int | None) -> None:
+def _ask_owner(what: Action, experiment: int, data: Path, pid: int | None) -> None:
     request = inbox.post(data, what, experiment)
     deadline = time.monotonic() + ANSWER_SECONDS
     while request.exists():
