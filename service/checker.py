@@ -13,6 +13,7 @@ from jobs import experiments, grid, plan
 from jobs.estimate import Estimate, estimate
 from jobs.store import FILE, Store
 from service.progress import duration
+from service.tables import size
 
 
 def check_grid(file: Path, data: Path, *, as_json: bool) -> None:
@@ -53,13 +54,4 @@ def _show(planned: plan.Plan, cost: Estimate, data: Path) -> None:
         print(f"  rounded spp  {rounded.sampler}: {rounded.asked} asked, {rounded.rendered} rendered")
     guess = " (a guess: nothing like it was timed on this machine yet)" if cost.rough and cost.samples else ""
     print(f"  time         about {duration(cost.seconds)}{guess}" if cost.samples else "  time         nothing to do")
-    print(f"  disk         about {_size(cost.disk_bytes)}")
-
-
-def _size(count: float) -> str:
-    """``3.4 MB``, in powers of a thousand as disks are sold."""
-    for unit in ("B", "kB", "MB", "GB"):
-        if count < 1000:
-            return f"{count:.3g} {unit}"
-        count /= 1000
-    return f"{count:.3g} TB"
+    print(f"  disk         about {size(cost.disk_bytes)}")

@@ -2,8 +2,9 @@
 The command line: ``dartboard COMMAND``.
 
 Thin on purpose: types in, one call, words out. Nothing here imports Mitsuba, and what a command does not need
-is imported inside it, so that ``--help``, ``check`` and ``results`` answer at once. With ``--json`` stdout
-holds JSON and nothing else. Exit codes: 0 done, 1 some cells failed, 2 bad input, 3 environment, 130 interrupted.
+(an HTTP client, a server) is imported inside it, so that ``--help``, ``check`` and ``results`` answer at once. With
+``--json`` stdout holds JSON and nothing else. Exit codes: 0 done, 1 some cells failed, 2 bad input, 3 environment,
+130 interrupted.
 """
 
 from __future__ import annotations
@@ -12,11 +13,14 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from renderer.errors import DartboardError
+
+if TYPE_CHECKING:
+    from service.control import Action
 
 app = typer.Typer(
     help="Rendering experiments that people can believe: grids of samplers × integrators × scenes on Mitsuba 3.",
@@ -29,6 +33,14 @@ app = typer.Typer(
 Data = Annotated[
     Path | None, typer.Option("--data", help="Data directory (else DARTBOARD_DATA, else ./dartboard-data).")
 ]
+Server = Annotated[
+    str | None,
+    typer.Option(
+        "--server", metavar="URL", help="A running server instead of a data directory (else DARTBOARD_SERVER)."
+    ),
+]
+Device = Annotated[str, typer.Option(help="auto, llvm (the CPU) or cuda.")]
+Port = Annotated[int, typer.Option(min=0, max=65535, help="TCP port; 0 takes a free one.")]
 Json = Annotated[bool, typer.Option("--json", help="JSON on stdout.")]
 GridFile = Annotated[Path, typer.Argument(metavar="GRID", help="A grid file, such as examples/first.toml.")]
 ExperimentName = Annotated[
@@ -37,18 +49,65 @@ ExperimentName = Annotated[
 
 
 @app.command()
+def up(data: Data = None, port: Port = 8000, device: Device = "auto") -> None:
+    """Serve the dashboard on this machine; an empty data directory gets a demo grid to look at."""
+    _serve(data, "127.0.0.1", port, device, demo=True)
+
+
+@app.command()
+def serve(
+    data: Data = None,
+    host: Annotated[
+        str, typer.Option(help="Address to listen on; one that other machines reach needs DARTBOARD_TOKEN.")
+    ] = "127.0.0.1",
+    port: Port = 8000,
+    device: Device = "auto",
+) -> None:
+    """Serve the dashboard and the REST API, and render what is submitted."""
+    _serve(data, host, port, device, demo=False)
+
+
+def _serve(data: Path | None, host: str, port: int, device: str, *, demo: bool) -> None:
+    from service.serve import serve
+    from service.settings import data_directory
+
+    token = os.environ.get("DARTBOARD_TOKEN") or None
+    raise typer.Exit(serve(data_directory(data), host=host, port=port, device=device, demo=demo, token=token))
+
+
+@app.command()
 def run(
     grid: GridFile,
     data: Data = None,
-    device: Annotated[str, typer.Option(help="auto, llvm (the CPU) or cuda.")] = "auto",
+    device: Device = "auto",
     executor: Annotated[str, typer.Option(help="Where cells render: local (this machine).")] = "local",
+    report: Annotated[
+        Path | None, typer.Option(metavar="OUT.html", help="Write a report of the experiment at the end.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Run a grid to its end, with progress. Run it again: only what is missing is rendered."""
     from service.runner import run_grid
     from service.settings import data_directory
 
-    raise typer.Exit(run_grid(grid, data_directory(data), device=device, executor=executor, as_json=as_json))
+    place = data_directory(data)
+    raise typer.Exit(run_grid(grid, place, device=device, executor=executor, report=report, as_json=as_json))
+
+
+@app.command()
+def submit(
+    grid: GridFile,
+    server: Server = None,
+    wait: Annotated[
+        bool, typer.Option("--wait", help="Follow it to its end; Ctrl-C lets go, the server goes on.")
+    ] = False,
+    as_json: Json = False,
+) -> None:
+    """Hand a grid and its scenes to a running server."""
+    from service.remote import submit_grid
+    from service.settings import server_address
+
+    raise typer.Exit(submit_grid(grid, server_address(server), wait=wait, as_json=as_json))
 
 
 @app.command()
@@ -79,7 +138,7 @@ def render(
     seed: Annotated[int, typer.Option(help="Which replicate: another number, other samples.", min=0)] = 0,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Resolution in pixels (else the scene's).")] = None,
     max_depth: Annotated[int | None, typer.Option(help="Edges of the longest path; -1: unlimited.")] = None,
-    device: Annotated[str, typer.Option(help="auto, llvm (the CPU) or cuda.")] = "auto",
+    device: Device = "auto",
     as_json: Json = False,
 ) -> None:
     """Render one picture, outside of the queue."""
@@ -119,43 +178,101 @@ def results(
     form: Annotated[str, typer.Option("--format", help="csv, json or table.")] = "table",
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Write to a file instead of stdout.")] = None,
     data: Data = None,
+    server: Server = None,
 ) -> None:
     """Export an experiment: one row per replicate, with its errors and times."""
-    from service.readout import write_results
-    from service.settings import data_directory
+    from service.settings import place
 
-    write_results(experiment, data_directory(data), form, output)
+    match place(data, server):
+        case str(url):
+            from service.remote import download_results
+
+            download_results(experiment, url, form, output)
+        case folder:
+            from service.readout import write_results
+
+            write_results(experiment, folder, form, output)
+
+
+@app.command()
+def report(
+    experiment: ExperimentName,
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE", help="The file to write.")],
+    form: Annotated[str, typer.Option("--format", help="html.")] = "html",
+    data: Data = None,
+    server: Server = None,
+) -> None:
+    """Write an experiment as one file that opens anywhere: pictures, plots, tables, how to run it again."""
+    from service.settings import place
+
+    match place(data, server):
+        case str(url):
+            from service.remote import download_report
+
+            download_report(experiment, url, form, output)
+        case folder:
+            from service.readout import report_of
+
+            report_of(experiment, folder, form, output)
 
 
 @app.command()
 def status(
     experiment: Annotated[str | None, typer.Argument(metavar="[EXPERIMENT]")] = None,
     data: Data = None,
+    server: Server = None,
     as_json: Json = False,
 ) -> None:
     """Say how far experiments are: cells by state, failures with their reason, who works on them."""
-    from service.readout import show_status
-    from service.settings import data_directory
+    from service.settings import place
 
-    show_status(experiment, data_directory(data), as_json=as_json)
+    match place(data, server):
+        case str(url):
+            from service.remote import show_status_of
+
+            show_status_of(url, experiment, as_json=as_json)
+        case folder:
+            from service.readout import show_status
+
+            show_status(experiment, folder, as_json=as_json)
 
 
 @app.command()
-def cancel(experiment: ExperimentName, data: Data = None) -> None:
+def cancel(experiment: ExperimentName, data: Data = None, server: Server = None) -> None:
     """Stop an experiment: what is done stays, the rest is not rendered (until retry or run)."""
-    from service.control import change
-    from service.settings import data_directory
-
-    print(change("cancel", experiment, data_directory(data)))
+    _change("cancel", experiment, data, server)
 
 
 @app.command()
-def retry(experiment: ExperimentName, data: Data = None) -> None:
+def retry(experiment: ExperimentName, data: Data = None, server: Server = None) -> None:
     """Queue the failed and cancelled cells of an experiment again."""
-    from service.control import change
-    from service.settings import data_directory
+    _change("retry", experiment, data, server)
 
-    print(change("retry", experiment, data_directory(data)))
+
+@app.command()
+def pause(experiment: ExperimentName, data: Data = None, server: Server = None) -> None:
+    """Let an experiment rest, so that others are rendered first; resume goes on."""
+    _change("pause", experiment, data, server)
+
+
+@app.command()
+def resume(experiment: ExperimentName, data: Data = None, server: Server = None) -> None:
+    """Go on with an experiment that was paused."""
+    _change("resume", experiment, data, server)
+
+
+def _change(what: Action, experiment: str, data: Path | None, server: str | None) -> None:
+    from service.settings import place
+
+    match place(data, server):
+        case str(url):
+            from service.remote import change_there
+
+            print(change_there(what, experiment, url))
+        case folder:
+            from service.control import change
+
+            print(change(what, experiment, folder))
 
 
 @app.command()

@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator
 
 from rich.console import Console, Group
 from rich.live import Live
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.table import Column
 from rich.text import Text
 
 from jobs.dispatcher import News
 from jobs.executors.base import Failed, Finished, Passed
-from jobs.experiments import Standing
 from jobs.plan import Plan
 
 console = Console(stderr=True, highlight=False)
@@ -33,20 +33,16 @@ class Remaining(ProgressColumn):
         return Text("" if left is None else f"≈ {duration(left)} left", style="cyan", no_wrap=True)
 
 
-class Follower:
+class Bars:
     """
-    Turns the dispatcher's news into bars or lines, and learns from them how long the rest takes.
+    How far an experiment is: a bar for all its pictures and one for what is drawn now, or lines where is no terminal.
 
-    samples_left  samples still to be drawn; the rate is that of the renders seen so far, so the estimate knows this
-                  machine and needs no table of speeds
+    wanted, had  pictures, references included
     """
 
-    def __init__(self, plan: Plan, samples_left: float, before: Standing):
-        replicates, had = before.wanted, before.had
-        self.labels = {cell.spec.digest: (cell.scene, cell.integrator, cell.sampler) for cell in plan.cells}
-        self.samples_left = samples_left
-        self.replicates, self.had = replicates, had
-        self.drawn_samples = self.drawn_seconds = 0.0
+    def __init__(self, wanted: int, had: int, now: str = "starting the renderer"):
+        self.wanted, self.had = wanted, had
+        self.seconds_left: float | None = None
         self.live = console.is_terminal
         # Two tables: one row's long name must not push the other row's numbers off a narrow terminal.
         self.whole = Progress(
@@ -58,59 +54,81 @@ class Follower:
             TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis")),
             console=console,
         )
-        self.total = self.whole.add_task("", total=max(replicates, 1), completed=had, count=f"{had}/{replicates}")
-        self.now = self.one.add_task("starting the renderer", total=None)
+        self.total = self.whole.add_task("", total=max(wanted, 1), completed=had, count=f"{had}/{wanted}")
+        self.current = self.one.add_task(escape(now), total=None)
         self.bars = Live(Group(self.whole, self.one), console=console, refresh_per_second=8)
 
-    def __enter__(self) -> Follower:
+    def __enter__(self) -> Bars:
         if self.live:
             self.bars.start()
         else:
-            console.print(f"{self.replicates - self.had} pictures to render, {self.had} are there")
+            console.print(f"{self.wanted - self.had} pictures to render, {self.had} are there")
         return self
 
     def __exit__(self, *error: object) -> None:
         if self.live:
-            self.one.update(self.now, visible=False)
+            self.one.update(self.current, visible=False)
             self.whole.update(self.total, seconds_left=None)
             self.bars.stop()
 
+    def now(self, description: str, completed: int, total: int | None) -> None:
+        """What is drawn now, and how many of its passes are done."""
+        self.one.update(self.current, description=escape(description), completed=completed, total=total)
+
+    def count(self, had: int, seconds_left: float | None) -> None:
+        """How many pictures are there, and how long the rest may take."""
+        self.had, self.seconds_left = had, seconds_left
+        self.whole.update(self.total, completed=had, count=f"{had}/{self.wanted}", seconds_left=seconds_left)
+
+    def done(self, name: str) -> None:
+        """A cell has all its pictures."""
+        if not self.live:
+            left = f"  (≈ {duration(self.seconds_left)} left)" if self.seconds_left else ""
+            self.say(f"{self.had:4}/{self.wanted}  {name}{left}")
+
+    def failed(self, name: str, error_class: str, message: str) -> None:
+        console.print(f"[red]{error_class}[/red] in {escape(f'{name}: {message}')}", soft_wrap=True)
+
+    def say(self, line: str) -> None:
+        """A line that stays, above the bars."""
+        console.print(escape(line), soft_wrap=True)
+
+
+class Follower:
+    """
+    Turns the dispatcher's news into bars or lines, and learns from them how long the rest takes.
+
+    samples_left  samples still to be drawn; the rate is that of the renders seen so far, so the estimate knows this
+                  machine and needs no table of speeds
+    """
+
+    def __init__(self, plan: Plan, samples_left: float, bars: Bars):
+        self.labels = {cell.spec.digest: (cell.scene, cell.integrator, cell.sampler) for cell in plan.cells}
+        self.samples_left, self.bars = samples_left, bars
+        self.drawn_samples = self.drawn_seconds = 0.0
+
     def hear(self, news: News) -> None:
         """One piece of news from the dispatcher."""
-        scene, integrator, sampler = self.labels.get(news.work.digest, ("", "", ""))
-        name = f"{scene} · {integrator} · {sampler} · {news.work.spec.spp} spp"
+        name = cell_name(*self.labels.get(news.work.digest, ("", "", "")), news.work.spec.spp)
         match news.event:
             case Passed(role=role, k=k, done=done, passes=passes):
-                self._now(f"{name} · {_replicate(role, k)} · pass {done}/{passes}", done, passes)
+                self.bars.now(f"{name} · {replicate_name(role, k)} · pass {done}/{passes}", done, passes)
             case Finished(role=role, k=k) as finished:
                 self._count(news, finished)
-                self._now(f"{name} · {_replicate(role, k)}", 1, 1)
+                self.bars.now(f"{name} · {replicate_name(role, k)}", 1, 1)
             case Failed(error_class=error_class, message=message):
                 again = "" if news.kind == "failed" else "; it is tried again"
-                console.print(f"[red]{error_class}[/red] in {name}: {message}{again}", soft_wrap=True)
-        if news.kind == "done" and not self.live:
-            console.print(f"{self.had:4}/{self.replicates}  {name}{self._left()}", soft_wrap=True)
-
-    def _now(self, description: str, completed: int, total: int) -> None:
-        self.one.update(self.now, description=description, completed=completed, total=total)
+                self.bars.failed(name, error_class, message + again)
+        if news.kind == "done":
+            self.bars.done(name)
 
     def _count(self, news: News, finished: Finished) -> None:
         width, height = news.work.spec.estimand.size
         samples = width * height * news.work.spec.spp
-        self.had += 1
         self.samples_left = max(self.samples_left - samples, 0)
         self.drawn_samples += samples
         self.drawn_seconds += finished.render_seconds + finished.compile_seconds
-        count = f"{self.had}/{self.replicates}"
-        self.whole.update(self.total, completed=self.had, count=count, seconds_left=self.seconds_left())
-
-    def seconds_left(self) -> float | None:
-        """Estimate of the time still needed, None before anything was drawn."""
-        return self.samples_left * self.drawn_seconds / self.drawn_samples if self.drawn_samples else None
-
-    def _left(self) -> str:
-        left = self.seconds_left()
-        return f"  (≈ {duration(left)} left)" if left else ""
+        self.bars.count(self.bars.had + 1, self.samples_left * self.drawn_seconds / self.drawn_samples)
 
 
 @contextlib.contextmanager
@@ -141,5 +159,11 @@ def duration(seconds: float) -> str:
     return f"{whole // 3600} h {whole % 3600 // 60} min"
 
 
-def _replicate(role: str, k: int) -> str:
+def cell_name(scene: str, integrator: str, sampler: str, spp: int) -> str:
+    """``cornell_box · path · stratified · 16 spp``."""
+    return f"{scene} · {integrator} · {sampler} · {spp} spp"
+
+
+def replicate_name(role: str, k: int) -> str:
+    """A picture of a cell, counted from 1: ``replicate 3``, ``reference 1``."""
     return f"reference {k + 1}" if role == "reference" else f"replicate {k + 1}"

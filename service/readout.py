@@ -2,46 +2,67 @@
 
 from __future__ import annotations
 
+import io
 import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TextIO
 
-from rich import box
-from rich.console import Console
-from rich.table import Table
-
 from jobs import experiments, owner, results
+from jobs.artifacts import Artifacts
 from jobs.experiments import Experiment, Standing
 from jobs.store import Store
 from renderer.errors import UnknownName
-from service.tables import show_errors, show_failures
+from service.output import whole
+from service.tables import show_errors, show_experiments, show_failures
 
 FORMATS = ("csv", "json", "table")
+REPORTS = ("html",)
 
 
 def write_results(name: str, data: Path, form: str, output: Path | None) -> None:
     """Every replicate of an experiment as CSV, JSON, or as the table that ``run`` prints."""
-    if form not in FORMATS:
-        raise UnknownName("format", form, "--format", FORMATS)
+    known_format(form, FORMATS)
     store = Store.read(data)
     experiment = experiments.find(store, name)
     if form == "table":
         show_errors(results.summary(store, experiment.id))
-        return
-    if output is None:
+    elif output is None:
         _write(store, experiment, form, sys.stdout)
-        return
-    part = output.with_name(output.name + ".part")
-    with part.open("w", encoding="utf-8", newline="") as file:
-        _write(store, experiment, form, file)
-    part.replace(output)
+    else:
+        with whole(output) as file, io.TextIOWrapper(file, encoding="utf-8", newline="") as text:
+            _write(store, experiment, form, text)
 
 
 def _write(store: Store, experiment: Experiment, form: str, file: TextIO) -> None:
     write = results.write_csv if form == "csv" else results.write_json
     write(results.rows(store, experiment.id), file)
+
+
+def report_of(name: str, data: Path, form: str, output: Path) -> None:
+    """``dartboard report``: an experiment as one file that opens anywhere."""
+    known_format(form, REPORTS)
+    store = Store.read(data)
+    write_report(store, Artifacts(data), experiments.find(store, name), output)
+
+
+def write_report(store: Store, artifacts: Artifacts, experiment: Experiment, output: Path) -> None:
+    from service.report import render_report
+
+    with whole(output) as file:
+        file.write(render_report(store, artifacts, experiment.id).encode())
+
+
+def known_format(form: str, known: tuple[str, ...]) -> None:
+    if form not in known:
+        raise UnknownName("format", form, "--format", known)
+
+
+def failures(store: Store, experiment: Experiment, data: Path) -> list[dict[str, Any]]:
+    """The failed cells of an experiment, each with the place of its log."""
+    rows = store.rows("failures", experiment_id=experiment.id)
+    return [row | {"log": row["log"] and data / row["log"]} for row in rows]
 
 
 def show_status(name: str | None, data: Path, *, as_json: bool) -> None:
@@ -54,25 +75,26 @@ def show_status(name: str | None, data: Path, *, as_json: bool) -> None:
         told = [_as_json(experiment, standing) for experiment, standing in standings]
         print(json.dumps({"data": str(data), "owner": who, "experiments": told}, indent=2, ensure_ascii=False))
         return
-    console = Console(highlight=False)
-    table = Table(box=box.SIMPLE_HEAD)
-    for column in ("id", "name", "state", "cells done", "references done", "pictures", "failed"):
-        table.add_column(column, justify="left" if column in ("name", "state") else "right")
-    for experiment, standing in standings:
-        table.add_row(
-            str(experiment.id), experiment.name, standing.state, _part(standing.cells), _part(standing.references),
-            f"{standing.had}/{standing.wanted}", str(standing.failed or ""),
-        )  # fmt: skip
-    console.print(table)
-    console.print(f"{data} is in use by process {who.get('pid')}" if who else f"nobody is working on {data}")
+    show_experiments(
+        (
+            experiment.id, experiment.name, standing.state, standing.cells, standing.references, standing.had,
+            standing.wanted, standing.failed,
+        )
+        for experiment, standing in standings
+    )  # fmt: skip
+    print(_who(who, data))
     for experiment, standing in standings:
         if standing.failed:
-            show_failures(list(store.rows("failures", experiment_id=experiment.id)), data)
+            show_failures(failures(store, experiment, data))
 
 
-def _part(counts: dict[str, int]) -> str:
-    return f"{counts.get('done', 0)}/{sum(counts.values())}"
+def _who(who: dict[str, Any] | None, data: Path) -> str:
+    if who is None:
+        return f"nobody is working on {data}"
+    at = f", a server at {who['url']}" if who.get("url") else ""
+    return f"{data} is in use by process {who.get('pid')}{at}"
 
 
 def _as_json(experiment: Experiment, standing: Standing) -> dict[str, Any]:
-    return asdict(experiment) | {"state": standing.state} | asdict(standing)
+    told = {key: value for key, value in asdict(experiment).items() if key not in ("grid", "deleted_at")}
+    return told | {"state": standing.state} | asdict(standing)

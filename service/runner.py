@@ -7,11 +7,12 @@ SIGTERM end both within seconds and keep what is finished; the next run goes on 
 
 from __future__ import annotations
 
-import json
 import platform
 import signal
 from pathlib import Path
 from types import FrameType
+
+from rich.markup import escape
 
 from jobs import experiments, grid, measure, owner, plan, queue, results
 from jobs.artifacts import Artifacts
@@ -21,25 +22,32 @@ from jobs.experiments import Experiment, Standing
 from jobs.store import Store
 from renderer import devices
 from renderer.errors import UnknownName
-from service.progress import Follower, console
+from service.outcome import Outcome, tell
+from service.output import refuse_unwritable
+from service.progress import Bars, Follower, console
+from service.readout import failures, write_report
 from service.settings import usable_kernel_caches
-from service.tables import show_errors, show_failures
 
 EXECUTORS = ("local",)  # "ray" comes with the extra of that name
 
 
-def run_grid(file: Path, data: Path, *, device: str, executor: str, as_json: bool) -> int:
+def run_grid(file: Path, data: Path, *, device: str, executor: str, report: Path | None, as_json: bool) -> int:
     """
-    Run the grid in ``file`` and print its errors; the exit code: 0 done, 1 some cells failed or were cancelled,
-    130 interrupted.
+    Run the grid in ``file``, print its errors and write the ``report``; the exit code: 0 done, 1 some cells failed or
+    were cancelled, 130 interrupted.
 
-    Bad input is found before anything is written to ``data``.
+    Bad input is found before anything is written to ``data``. Where a server owns ``data`` it gets the grid.
     """
     if executor not in EXECUTORS:
         raise UnknownName("executor", executor, "--executor", EXECUTORS)
-    planned = plan.expand(grid.read(file))
-    chosen = devices.pick(device)
-    artifacts = Artifacts(data)
+    if report:
+        refuse_unwritable(report)
+    asked = grid.read(file)
+    if url := (owner.peek(data) or {}).get("url"):
+        from service.remote import run_there
+
+        return run_there(file, data, url, device=device, report=report, as_json=as_json)
+    planned, chosen, artifacts = plan.expand(asked), devices.pick(device), Artifacts(data)
     with owner.own(data):
         artifacts.prepare()
         store = Store.open(data)
@@ -51,10 +59,13 @@ def run_grid(file: Path, data: Path, *, device: str, executor: str, as_json: boo
             measure.catch_up(store, artifacts)  # an owner that was killed after its last picture left it unmeasured
         else:
             interrupted = _render(store, artifacts, experiment, planned, before, chosen)
-        standing = experiments.standing(store, experiment.id)
-        _tell(store, experiment, before, standing, interrupted, data, as_json)
+        outcome = _outcome(store, experiment, before, interrupted, data)
+        if report and not interrupted:
+            write_report(store, artifacts, experiment, report)
         store.close()
-    return 130 if interrupted else 0 if standing.state == "done" else 1
+    number = f"every number: dartboard results {experiment.id} --format csv"
+    tell(outcome, where=f"pictures in {data / 'images'}; {number}", go_on="dartboard retry", as_json=as_json)
+    return outcome.exit_code
 
 
 def _render(
@@ -62,11 +73,12 @@ def _render(
     device: devices.Device,
 ) -> bool:  # fmt: skip
     """Work until nothing is left; True if a signal ended it."""
-    console.print(f"{experiment.name} (experiment {experiment.id}) on {device.description}")
+    console.print(escape(f"{experiment.name} (experiment {experiment.id}) on {device.description}"))
     local = LocalExecutor(
         device, kernels=usable_kernel_caches(artifacts.data), logs=artifacts.logs, cwd=artifacts.empty
     )
-    follower = Follower(planned, store.value("samples_left", experiment_id=experiment.id) or 0, before)
+    bars = Bars(before.wanted, before.had)
+    follower = Follower(planned, store.value("samples_left", experiment_id=experiment.id) or 0, bars)
     dispatcher = Dispatcher(
         store, artifacts, local, machine=platform.node(), device=device.name, experiment=experiment.id,
         on_news=follower.hear,
@@ -80,7 +92,7 @@ def _render(
 
     previous = {number: signal.signal(number, stop) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
-        with follower:
+        with bars:
             dispatcher.run()
     finally:
         local.close()
@@ -89,27 +101,10 @@ def _render(
     return interrupted
 
 
-def _tell(
-    store: Store, experiment: Experiment, before: Standing, standing: Standing, interrupted: bool, data: Path,
-    as_json: bool,
-) -> None:  # fmt: skip
-    """What came of it: counts and, at the end, the table of errors."""
-    if as_json:
-        points = [point.__dict__ for point in results.summary(store, experiment.id)]
-        told = {
-            "experiment": experiment.id, "name": experiment.name, "state": standing.state,
-            "cells": standing.cells, "references": standing.references, "pictures": standing.had,
-            "wanted": standing.wanted, "interrupted": interrupted, "points": points,
-        }  # fmt: skip
-        print(json.dumps(told, indent=2, ensure_ascii=False))
-        return
-    if interrupted:
-        console.print(f"stopped: {standing.had} of {standing.wanted} pictures are there; run it again to go on")
-        return
-    if standing.state == "cancelled":
-        console.print(f"cancelled: {standing.had} of {standing.wanted} pictures are there; `dartboard retry` goes on")
-    elif standing.had == before.had and standing.state == "done":
-        console.print(f"nothing to do: all {standing.had} pictures of {experiment.name!r} are there")
-    show_errors(results.summary(store, experiment.id))
-    show_failures(list(store.rows("failures", experiment_id=experiment.id)), data)
-    console.print(f"pictures in {data / 'images'}; every number: dartboard results {experiment.id} --format csv")
+def _outcome(store: Store, experiment: Experiment, before: Standing, interrupted: bool, data: Path) -> Outcome:
+    standing = experiments.standing(store, experiment.id)
+    return Outcome(
+        experiment.id, experiment.name, standing.state, standing.cells, standing.references, standing.had,
+        standing.wanted, before.had, results.summary(store, experiment.id), failures(store, experiment, data),
+        "stopped; run it again to go on" if interrupted else None,
+    )  # fmt: skip

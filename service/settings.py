@@ -1,9 +1,14 @@
-"""Where things lie: the data directory and the kernel caches, from the command line, the environment, or by default."""
+"""
+Where things are: the data directory, the server and the kernel caches, from the command line, the environment, or by
+default.
+"""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
+
+from renderer.errors import BadParameter
 
 DEFAULT_DATA = "dartboard-data"
 
@@ -11,6 +16,28 @@ DEFAULT_DATA = "dartboard-data"
 def data_directory(given: Path | None) -> Path:
     """``--data``, else the variable DARTBOARD_DATA, else ``./dartboard-data``; nothing is created."""
     return Path(given or os.environ.get("DARTBOARD_DATA") or DEFAULT_DATA)
+
+
+def place(data: Path | None, server: str | None) -> Path | str:
+    """
+    Where a command reads an experiment: a data directory, or the address of a server (a text).
+
+    What the command line says counts more than the environment; there DARTBOARD_SERVER more than DARTBOARD_DATA.
+    Raises ``BadParameter`` if the command line says both.
+    """
+    if data is not None and server is not None:
+        raise BadParameter(f"--data {data} and --server {server} are two places; give one of them")
+    if data is None:
+        server = server or os.environ.get("DARTBOARD_SERVER")
+    return server or data_directory(data)
+
+
+def server_address(given: str | None) -> str:
+    """``--server``, else DARTBOARD_SERVER. Raises ``BadParameter`` without either."""
+    address = given or os.environ.get("DARTBOARD_SERVER")
+    if not address:
+        raise BadParameter("which server? give --server URL, or set DARTBOARD_SERVER; `dartboard up` starts one")
+    return address
 
 
 def kernel_caches() -> Path:

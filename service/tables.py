@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any
 
 from rich import box
@@ -52,14 +52,25 @@ def _cell(point: Point | None, best: float) -> Text:
     return Text(f"{point.mean:.3e}{error}{rounded}", style="bold" if point.mean == best else "")
 
 
-def show_failures(failures: list[dict[str, Any]], data: Path) -> None:
+def show_experiments(rows: Iterable[tuple[int, str, str, dict[str, int], dict[str, int], int, int, int]]) -> None:
+    """``dartboard status``: id, name, state, cells and references by state, pictures had and wanted, cells failed."""
+    table = Table(box=box.SIMPLE_HEAD)
+    for column in ("id", "name", "state", "cells done", "references done", "pictures", "failed"):
+        table.add_column(column, justify="left" if column in ("name", "state") else "right")
+    for experiment, name, state, cells, references, had, wanted, failed in rows:
+        done = (f"{counts.get('done', 0)}/{sum(counts.values())}" for counts in (cells, references))
+        table.add_row(str(experiment), Text(name), state, *done, f"{had}/{wanted}", str(failed or ""))
+    Console(highlight=False).print(table)
+
+
+def show_failures(failures: list[dict[str, Any]]) -> None:
     """What failed, why, and where its log is."""
     if not failures:
         return
     console = Console(stderr=True, highlight=False)
     console.print(f"[red]{len(failures)} cells failed[/red]; `dartboard retry` queues them again")
     for row in failures:
-        log = f" (log: {data / row['log']})" if row["log"] else ""
+        log = f" (log: {row['log']})" if row["log"] else ""
         text = f"  {row['scene']} · {row['integrator']} · {row['sampler']} · {row['spp']} spp: {row['error']}{log}"
         console.print(Text(text), soft_wrap=True)
 
@@ -101,3 +112,12 @@ def _parameter(item: dict[str, Any]) -> str:
     default = "from the grid or the scene" if item["default"] is None else str(item["default"]).lower()
     unit = f" {item['unit']}" if item["unit"] else ""
     return f"  {item['name']} = {default}{unit}: {item['line']}"
+
+
+def size(count: float) -> str:
+    """``3.4 MB``, in powers of a thousand as disks are sold."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"
