@@ -60,15 +60,15 @@ export function address() {
 }
 
 /**
- * Sets several values of the query at once; null or "" takes one out.
- * @param {Record<string, string | null>} values @param {{push?: boolean}} [options] push: back undoes it
+ * Sets several values of the query at once; null or "" takes one out, a list repeats the name.
+ * @param {Record<string, string | readonly string[] | null>} values @param {{push?: boolean}} [options] push: back undoes it
  */
 export function setParams(values, { push = false } = {}) {
   if (push) write();
   const next = new URL(here);
   for (const [name, value] of Object.entries(values)) {
-    if (value === null || value === "") next.searchParams.delete(name);
-    else next.searchParams.set(name, value);
+    next.searchParams.delete(name);
+    for (const one of value === null || value === "" ? [] : [value].flat()) next.searchParams.append(name, one);
   }
   if (next.href === here.href) return;
   here = next;

@@ -1,0 +1,80 @@
+// @ts-check
+/** Small parts of the form: a titled section, a text field, and the faults beside them. */
+import { html } from "../../vendor/preact-htm.js";
+
+/** @typedef {import("../../vendor/preact-htm.js").Child} Child */
+/** @typedef {import("../../api.js").Fault} Fault */
+
+/** What in the form shows a fault of which key of a grid. @type {Record<string, string>} */
+const SHOWN_AT = { scene: "scenes", crop: "scenes" };
+const FIELDS = ["name", "scenes", "samplers", "integrators", "spp", "replicates", "resolution", "max_depth", "rfilter", "colour", "reference"];
+
+/** The field of the form that shows a fault, null for none. @param {Fault} fault */
+export function placeOf({ field }) {
+  const key = field?.split(/[.[]/)[0] ?? "";
+  const shown = SHOWN_AT[key] ?? key;
+  return FIELDS.includes(shown) ? shown : null;
+}
+
+/** @param {{of: string, faults: readonly Fault[]}} props */
+export function Faults({ of: field, faults }) {
+  const own = faults.filter((fault) => placeOf(fault) === field);
+  return html`<div id=${`fault-${field}`} class="faults-here" role="status">
+    ${own.map(({ detail }) => html`<p class="fault" key=${detail}>${detail}</p>`)}
+  </div>`;
+}
+
+/** @param {{id: string, title: string, hint?: Child, faults: readonly Fault[], aside?: Child, children?: Child}} props */
+export function Section({ id, title, hint, faults, aside, children }) {
+  return html`<section class="form-section panel" id=${id} aria-labelledby=${`${id}-title`}>
+    <div class="form-title">
+      <h2 id=${`${id}-title`}>${title}</h2>
+      ${hint && html`<p class="hint">${hint}</p>`}
+      <span class="spacer"></span>
+      ${aside}
+    </div>
+    ${children}
+    <${Faults} of=${id} faults=${faults} />
+  </section>`;
+}
+
+/**
+ * One line of text with its label, and its faults if it has a field of its own.
+ * @param {{label: string, value: string, onInput: (value: string) => void, field?: string, faults?: readonly Fault[],
+ *   placeholder?: string, hint?: Child, numeric?: boolean, wide?: boolean}} props
+ */
+export function TextField({ label, value, onInput, field, faults = [], placeholder, hint, numeric = false, wide = false }) {
+  const wrong = field !== undefined && faults.some((fault) => placeOf(fault) === field);
+  return html`<div class="field">
+    <label>
+      <span class="label">${label}</span>
+      <input
+        type="text"
+        class=${wide ? "wide" : "short"}
+        inputmode=${numeric ? "numeric" : "text"}
+        autocomplete="off"
+        value=${value}
+        placeholder=${placeholder}
+        aria-invalid=${wrong}
+        aria-describedby=${field ? `fault-${field}` : null}
+        onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => onInput(event.currentTarget.value)}
+      />
+    </label>
+    ${hint && html`<p class="hint">${hint}</p>`} ${field && html`<${Faults} of=${field} faults=${faults} />`}
+  </div>`;
+}
+
+/**
+ * @param {{label: string, value: string, options: readonly string[], onChange: (value: string) => void}} props
+ */
+export function SelectField({ label, value, options, onChange }) {
+  const known = options.includes(value) ? options : [value, ...options];
+  return html`<div class="field">
+    <label>
+      <span class="label">${label}</span>
+      <select value=${value} onChange=${(/** @type {{currentTarget: HTMLSelectElement}} */ event) => onChange(event.currentTarget.value)}>
+        ${known.map((option) => html`<option key=${option} value=${option} selected=${option === value}>${option}</option>`)}
+      </select>
+    </label>
+  </div>`;
+}

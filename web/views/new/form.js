@@ -1,0 +1,181 @@
+// @ts-check
+/**
+ * What the form of a new experiment holds: pure values, and how they become a query, a grid and a submission.
+ *
+ * Whatever is typed stays as it was typed: the server says what is wrong with it, beside the field. The query holds
+ * only what differs from the form's beginning, so that a link to a form is short.
+ */
+
+/** @typedef {import("../../api.js").Submission} Submission */
+/** One value of an axis; parameters as they were typed, those that are the default left out. */
+/** @typedef {{type: string, parameters: Readonly<Record<string, string>>}} Choice */
+/** A scene; `digest` says which upload is meant, built-in scenes have none. */
+/** @typedef {{name: string, digest?: string}} SceneChoice */
+/** What pictures are measured against; "" is the server's default. */
+/** @typedef {{wanted: boolean, integrator: string, sampler: string, spp: string}} Reference */
+/**
+ * @typedef {object} Form
+ * @property {string} name
+ * @property {readonly SceneChoice[]} scenes
+ * @property {readonly Choice[]} samplers
+ * @property {readonly Choice[]} integrators
+ * @property {readonly string[]} spp
+ * @property {string} replicates
+ * @property {string} width "" with `height`: as each scene has it
+ * @property {string} height
+ * @property {string} depth "": as each scene has it
+ * @property {Choice} rfilter
+ * @property {string} colour
+ * @property {Reference} reference
+ */
+
+/** A small grid that answers a question in a minute or two. @type {Form} */
+export const START = {
+  name: "",
+  scenes: [{ name: "cornell_box" }],
+  samplers: ["independent", "stratified", "multijitter"].map(choice),
+  integrators: [choice("path")],
+  spp: ["4", "16", "64"],
+  replicates: "4",
+  width: "",
+  height: "",
+  depth: "",
+  rfilter: choice("box"),
+  colour: "rgb",
+  reference: { wanted: true, integrator: "path", sampler: "independent", spp: "4096" },
+};
+
+/** `stratified:jitter=false` → a choice. @param {string} text @returns {Choice} */
+export function choice(text) {
+  const colon = text.indexOf(":");
+  if (colon < 0) return { type: text, parameters: {} };
+  const pairs = text.slice(colon + 1).split(",").map((pair) => {
+    const equals = pair.indexOf("=");
+    return equals < 0 ? [pair, ""] : [pair.slice(0, equals), pair.slice(equals + 1)];
+  });
+  return { type: text.slice(0, colon), parameters: Object.fromEntries(pairs) };
+}
+
+/** The way back. @param {Choice} choice */
+export function label({ type, parameters }) {
+  const pairs = Object.entries(parameters).map(([key, value]) => `${key}=${value}`);
+  return type + (pairs.length ? `:${pairs.join(",")}` : "");
+}
+
+/** @param {SceneChoice} scene */
+const sceneText = ({ name, digest }) => name + (digest ? `@${digest}` : "");
+
+/** @param {string} text @returns {SceneChoice} */
+function scene(text) {
+  const [, name, digest] = /^(.*)@([0-9a-f]{64})$/.exec(text) ?? [];
+  return name === undefined ? { name: text } : { name, digest };
+}
+
+/** Every field of the form as a list of texts, by its name in the query. @param {Form} form @returns {Record<string, readonly string[]>} */
+function fields(form) {
+  const { wanted, integrator, sampler, spp } = form.reference;
+  return {
+    name: [form.name],
+    scene: form.scenes.map(sceneText),
+    sampler: form.samplers.map(label),
+    integrator: form.integrators.map(label),
+    spp: [form.spp.join(",")],
+    replicates: [form.replicates],
+    size: [form.width || form.height ? `${form.width}x${form.height}` : ""],
+    depth: [form.depth],
+    rfilter: [label(form.rfilter)],
+    colour: [form.colour],
+    reference: [wanted ? "" : "none"],
+    reference_integrator: [integrator],
+    reference_sampler: [sampler],
+    reference_spp: [spp],
+  };
+}
+
+/**
+ * The form as the values of the query; null where it is as it began, [""] where a list is empty.
+ * @param {Form} form @returns {Record<string, readonly string[] | null>}
+ */
+export function toQuery(form) {
+  const begun = fields(START);
+  const now = Object.entries(fields(form)).map(([key, values]) => {
+    const same = JSON.stringify(values) === JSON.stringify(begun[key]);
+    return [key, same ? null : values.length ? values : [""]];
+  });
+  return Object.fromEntries(now);
+}
+
+/** @param {URLSearchParams} params @returns {Form} */
+export function fromQuery(params) {
+  const begun = fields(START);
+  /** @param {string} key */
+  const all = (key) => (params.has(key) ? params.getAll(key) : (begun[key] ?? [])).filter((text) => text !== "");
+  /** @param {string} key */
+  const one = (key) => (params.has(key) ? params.get(key) : begun[key]?.[0]) ?? "";
+  const [width = "", height = ""] = one("size").split("x");
+  return {
+    name: one("name"),
+    scenes: all("scene").map(scene),
+    samplers: all("sampler").map(choice),
+    integrators: all("integrator").map(choice),
+    spp: one("spp").split(",").filter(Boolean),
+    replicates: one("replicates"),
+    width,
+    height,
+    depth: one("depth"),
+    rfilter: choice(one("rfilter")),
+    colour: one("colour"),
+    reference: {
+      wanted: one("reference") !== "none",
+      integrator: one("reference_integrator"),
+      sampler: one("reference_sampler"),
+      spp: one("reference_spp"),
+    },
+  };
+}
+
+/** A number where one was typed, else the text, for the server to say what is wrong with it. @param {string} text */
+function value(text) {
+  const trimmed = text.trim();
+  return /^-?\d{1,15}(\.\d+)?$/.test(trimmed) ? Number(trimmed) : trimmed;
+}
+
+/** The grid that the form asks for, as the server reads it. @param {Form} form */
+export function toSubmission(form) {
+  const { reference } = form;
+  const asked = Object.entries(reference).filter(([key, text]) => key !== "wanted" && text !== "");
+  const grid = {
+    name: form.name.trim() || suggestedName(form),
+    scenes: form.scenes.map(({ name }) => name),
+    samplers: form.samplers.map(label),
+    integrators: form.integrators.map(label),
+    spp: form.spp.map(value),
+    ...(form.replicates !== "" && { replicates: value(form.replicates) }),
+    ...((form.width !== "" || form.height !== "") && { resolution: [value(form.width), value(form.height)] }),
+    ...(form.depth !== "" && { max_depth: value(form.depth) }),
+    rfilter: label(form.rfilter),
+    colour: form.colour,
+    reference: reference.wanted
+      ? Object.fromEntries(asked.map(([key, text]) => [key, key === "spp" ? value(String(text)) : text]))
+      : false,
+  };
+  return { grid, origin: "the form", scenes: uploads(form.scenes) };
+}
+
+/** @param {readonly SceneChoice[]} scenes @returns {Record<string, string>} */
+function uploads(scenes) {
+  return Object.fromEntries(scenes.flatMap(({ name, digest }) => (digest ? [[name, digest]] : [])));
+}
+
+/** A name that says what is compared, for who gives none. @param {Form} form */
+export function suggestedName({ samplers, integrators, scenes }) {
+  const axis = samplers.length > 1 || integrators.length <= 1 ? samplers : integrators;
+  const compared = list(axis.map(label)) || "Nothing";
+  const name = `${compared} on ${list(scenes.map(({ name: one }) => one)) || "no scene"}`;
+  return name.length <= 120 ? name : `${axis.length} ${axis === samplers ? "samplers" : "integrators"} on ${scenes.length} scenes`;
+}
+
+/** "a, b and c". @param {readonly string[]} words */
+function list(words) {
+  return words.length < 2 ? words.join() : `${words.slice(0, -1).join(", ")} and ${words.at(-1)}`;
+}

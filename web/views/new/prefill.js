@@ -1,0 +1,58 @@
+// @ts-check
+/**
+ * An experiment as the beginning of another: its grid in the form, or as text where the form has no field for it.
+ */
+import { choice } from "./form.js";
+import { readToml } from "./toml.js";
+
+/** @typedef {import("./form.js").Form} Form */
+/** @typedef {import("../../api.js").ExperimentDetail} ExperimentDetail */
+
+const KNOWN = ["name", "scenes", "samplers", "integrators", "spp", "replicates", "resolution", "max_depth", "rfilter", "colour", "reference"];
+const COPY = / \(copy(?: (\d+))?\)$/;
+
+/** The form of an experiment's grid, null where the form cannot say all of it. @param {ExperimentDetail} experiment @returns {Form | null} */
+export function formOf({ toml, paths = {} }) {
+  const grid = readToml(toml);
+  if (!grid || Object.keys(grid).some((key) => !KNOWN.includes(key))) return null;
+  const reference = grid.reference;
+  if (isTable(reference) && "replicates" in reference && reference.replicates !== 2) return null;
+  const [width, height] = texts(grid.resolution);
+  /** @param {string} name */
+  const said = (name) => (isTable(reference) && name in reference ? String(reference[name]) : "");
+  return {
+    name: copied(String(grid.name ?? "")),
+    scenes: texts(grid.scenes).map((name) => (paths[name] ? { name, digest: paths[name] } : { name })),
+    samplers: texts(grid.samplers).map(choice),
+    integrators: texts(grid.integrators).map(choice),
+    spp: texts(grid.spp),
+    replicates: String(grid.replicates ?? ""),
+    width: width ?? "",
+    height: height ?? "",
+    depth: String(grid.max_depth ?? ""),
+    rfilter: choice(String(grid.rfilter ?? "box")),
+    colour: String(grid.colour ?? "rgb"),
+    reference: { wanted: reference !== false, integrator: said("integrator"), sampler: said("sampler"), spp: said("spp") },
+  };
+}
+
+/** The text of an experiment's grid under the name of a copy. @param {ExperimentDetail} experiment */
+export function tomlOf({ toml, name }) {
+  return toml.replace(/^name = .*$/m, () => `name = ${JSON.stringify(copied(name))}`);
+}
+
+/** @param {unknown} value @returns {value is Record<string, unknown>} */
+function isTable(value) {
+  return typeof value === "object" && value !== null && !Array.isArray(value);
+}
+
+/** A list as texts. @param {unknown} value @returns {string[]} */
+function texts(value) {
+  return Array.isArray(value) ? value.map(String) : [];
+}
+
+/** "x" → "x (copy)" → "x (copy 2)". @param {string} name */
+function copied(name) {
+  const found = COPY.exec(name);
+  return found ? name.replace(COPY, ` (copy ${Number(found[1] ?? 1) + 1})`) : `${name} (copy)`;
+}

@@ -1,0 +1,138 @@
+// @ts-check
+/** The numbers of a grid: samples per pixel, pictures and their size, and what they are measured against. */
+import { html, useState } from "../../vendor/preact-htm.js";
+import { Icon } from "../../parts/icons.js";
+import { entryOf } from "./catalog.js";
+import { Faults, SelectField, TextField } from "./fields.js";
+import { Parameters } from "./plugins.js";
+
+/** @typedef {import("../../api.js").Fault} Fault */
+/** @typedef {import("./catalog.js").Catalog} Catalog */
+/** @typedef {import("./form.js").Form} Form */
+/** @typedef {(change: Partial<Form>) => void} Change */
+
+const POWERS = Array.from({ length: 13 }, (_, power) => String(2 ** power)); // 1 to 4096
+/** Ladders that give a slope: enough points, evenly apart on a logarithmic axis. @type {readonly [string, readonly string[]][]} */
+const LADDERS = [
+  ["4, 16, 64, 256", ["4", "16", "64", "256"]],
+  ["4, 8, 16 … 256", ["4", "8", "16", "32", "64", "128", "256"]],
+];
+const SIZES = ["64", "128", "256", "512"];
+
+/** @param {{spp: readonly string[], onChange: (spp: readonly string[]) => void}} props */
+export function Spp({ spp, onChange }) {
+  const [text, setText] = useState("");
+  const all = sorted([...new Set([...POWERS, ...spp])]);
+  /** @param {readonly string[]} values */
+  const set = (values) => onChange(sorted([...new Set(values)]));
+  /** @param {Event} event */
+  const add = (event) => {
+    event.preventDefault();
+    const values = text.split(/[\s,;]+/).filter(Boolean);
+    if (values.length) set([...spp, ...values]);
+    setText("");
+  };
+  return html`<div class="chips">
+      ${all.map(
+        (one) => html`<button
+          key=${one}
+          class="chip number"
+          type="button"
+          aria-pressed=${spp.includes(one)}
+          onClick=${() => set(spp.includes(one) ? spp.filter((other) => other !== one) : [...spp, one])}
+        >
+          ${one}
+        </button>`,
+      )}
+    </div>
+    <form class="row" onSubmit=${add}>
+      <input
+        type="text"
+        class="short"
+        inputmode="numeric"
+        aria-label="Other samples per pixel"
+        placeholder="other: 9, 25"
+        value=${text}
+        onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => setText(event.currentTarget.value)}
+        onBlur=${add}
+      />
+      <button class="button"><${Icon} name="plus" /> Add</button>
+      <span class="spacer"></span>
+      <span class="hint">or all of</span>
+      ${LADDERS.map(([title, values]) => html`<button key=${title} class="button quiet number" type="button" onClick=${() => set(values)}>${title}</button>`)}
+    </form>`;
+}
+
+/** By number; what is no number comes last. @param {readonly string[]} texts */
+function sorted(texts) {
+  /** @param {string} text */
+  const order = (text) => (Number.isFinite(Number(text)) ? Number(text) : Infinity);
+  return [...texts].sort((one, other) => order(one) - order(other) || 0);
+}
+
+/** @param {{form: Form, change: Change, catalog: Catalog, faults: readonly Fault[]}} props */
+export function Pictures({ form, change, catalog, faults }) {
+  const { replicates, width, height, depth, rfilter, colour } = form;
+  const filter = entryOf(catalog.rfilters, rfilter.type);
+  return html`<div class="fields">
+      <${TextField}
+        label="Replicates" field="replicates" numeric value=${replicates} faults=${faults} placeholder="4"
+        hint="pictures of each cell with other seeds; their spread is the error bar"
+        onInput=${(/** @type {string} */ text) => change({ replicates: text })}
+      />
+      <div class="field">
+        <span class="label">Resolution</span>
+        <div class="size">
+          <input
+            type="text" class="tiny" inputmode="numeric" aria-label="Width in pixels" placeholder="width" value=${width}
+            onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => change({ width: event.currentTarget.value })}
+          />
+          <span class="muted">×</span>
+          <input
+            type="text" class="tiny" inputmode="numeric" aria-label="Height in pixels" placeholder="height" value=${height}
+            onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => change({ height: event.currentTarget.value })}
+          />
+        </div>
+        <div class="row sizes">
+          ${SIZES.map((side) => html`<button key=${side} type="button" class="link" onClick=${() => change({ width: side, height: side })}>${side}²</button>`)}
+          <button type="button" class="link" onClick=${() => change({ width: "", height: "" })}>as the scene</button>
+        </div>
+        <${Faults} of="resolution" faults=${faults} />
+      </div>
+      <${TextField}
+        label="Longest path" field="max_depth" numeric value=${depth} faults=${faults} placeholder="as the scene"
+        hint="edges; −1 is unlimited" onInput=${(/** @type {string} */ text) => change({ depth: text.replace("−", "-") })}
+      />
+      <div class="field">
+        <${SelectField}
+          label="Filter" value=${rfilter.type} options=${catalog.rfilters.map(({ name }) => name)}
+          onChange=${(/** @type {string} */ type) => change({ rfilter: { type, parameters: {} } })}
+        />
+        ${filter && html`<${Parameters} entry=${filter} choice=${rfilter} onChange=${(/** @type {Form["rfilter"]} */ next) => change({ rfilter: next })} />`}
+        <p class="hint">${filter?.line}</p>
+        <${Faults} of="rfilter" faults=${faults} />
+      </div>
+      <div class="field">
+        <${SelectField} label="Colour" value=${colour} options=${["rgb", "spectral"]} onChange=${(/** @type {string} */ next) => change({ colour: next })} />
+        <p class="hint">spectral follows wavelengths instead of three colours, and takes longer</p>
+        <${Faults} of="colour" faults=${faults} />
+      </div>
+    </div>`;
+}
+
+/** @param {{reference: Form["reference"], onChange: (next: Form["reference"]) => void, catalog: Catalog}} props */
+export function ReferenceFields({ reference, onChange, catalog }) {
+  /** @param {Partial<Form["reference"]>} change */
+  const set = (change) => onChange({ ...reference, ...change });
+  return html`<div class="row" role="radiogroup" aria-label="Reference">
+      <button type="button" class="chip" role="radio" aria-checked=${reference.wanted} aria-pressed=${reference.wanted} onClick=${() => set({ wanted: true })}>render one</button>
+      <button type="button" class="chip" role="radio" aria-checked=${!reference.wanted} aria-pressed=${!reference.wanted} onClick=${() => set({ wanted: false })}>none</button>
+      ${!reference.wanted && html`<p class="hint">Without a reference there are pictures and times, but no errors and no curves.</p>`}
+    </div>
+    ${reference.wanted &&
+    html`<div class="fields">
+      <${TextField} label="Samples per pixel" numeric value=${reference.spp} placeholder="4096" hint="in total, in two independent halves" onInput=${(/** @type {string} */ spp) => set({ spp })} />
+      <${SelectField} label="Sampler" value=${reference.sampler} options=${catalog.samplers.map(({ name }) => name)} onChange=${(/** @type {string} */ sampler) => set({ sampler })} />
+      <${SelectField} label="Integrator" value=${reference.integrator} options=${catalog.integrators.map(({ name }) => name)} onChange=${(/** @type {string} */ integrator) => set({ integrator })} />
+    </div>`}`;
+}
