@@ -55,8 +55,9 @@ class Dispatcher:
     Works for one experiment, or for all of them (``experiment`` None), until nothing is left to do, or with
     ``forever`` until it is stopped.
 
-    ``on_news`` hears what happens to cells, ``on_turn`` is called between two events. ``stop`` may be called from a signal handler. Errors of the data directory (full, gone) end ``run`` with
-    ``DataDirectoryProblem``: what was committed stays, the rest is rendered by the next owner.
+    ``on_news`` hears what happens to cells, ``on_turn`` is called between two events. ``stop`` may be called from a
+    signal handler. Errors of the data directory (full, gone) end ``run`` with ``DataDirectoryProblem``: what was
+    committed stays, the rest is rendered by the next owner.
     """
 
     def __init__(

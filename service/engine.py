@@ -30,6 +30,7 @@ from jobs.store import Store
 from renderer.devices import Device
 from renderer.errors import DartboardError, EnvironmentProblem
 from service.settings import usable_kernel_caches
+from service.standings import Standings
 
 T = TypeVar("T")
 Change = Callable[[Store, Dispatcher], T]
@@ -120,7 +121,7 @@ class Engine:
     def __init__(self, data: Path, device: Device, on_change: Callable[[], None] = lambda: None):
         self.artifacts = Artifacts(data)
         self.device, self.on_change = device, on_change
-        self.readers = Readers(self.artifacts.data)
+        self.readers, self.standings = Readers(self.artifacts.data), Standings()
         self.moment = Moment()
         self.machine = platform.node()
         self.started_at = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")

@@ -10,12 +10,15 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import time
 from collections.abc import AsyncIterator, Awaitable, Callable
 from typing import Any
 
 from service.engine import Engine, Moment
 
 STEP_SECONDS = 0.25  # between two messages on one stream: fast enough for an eye, slow enough for fifty pages
+STEP_COSTS = 20.0  # a step lasts at least so many times what its messages took to make: 5 % of one core …
+LONGEST_STEP_SECONDS = 2.0  # … but a page never waits longer
 KEEP_ALIVE_SECONDS = 15.0
 RETRY_MILLISECONDS = 1000  # before a browser connects again
 
@@ -28,6 +31,7 @@ class Hub:
         self.poked = asyncio.Event()
         self.turned = asyncio.Event()  # replaced at every step
         self.closing = False
+        self.cost = 0.0  # seconds that the messages of this step took
         self.shared: dict[tuple[Any, ...], asyncio.Task[bytes | None]] = {}
 
     def poke(self) -> None:
@@ -44,8 +48,10 @@ class Hub:
             await self.poked.wait()
             self.poked.clear()
             self.shared.clear()
+            self.cost = 0.0
             self._turn()
             await asyncio.sleep(STEP_SECONDS)
+            await asyncio.sleep(min(STEP_COSTS * self.cost, LONGEST_STEP_SECONDS) - STEP_SECONDS)
 
     def close(self) -> None:
         """End every stream now, so that the server can end. From the event loop."""
@@ -63,8 +69,15 @@ class Hub:
     async def share(self, key: tuple[Any, ...], work: Callable[[], Awaitable[bytes | None]]) -> bytes | None:
         """The result of ``work`` for everybody who asks under this key before the next step."""
         if key not in self.shared:
-            self.shared[key] = asyncio.ensure_future(work())
+            self.shared[key] = asyncio.ensure_future(self._timed(work))
         return await asyncio.shield(self.shared[key])
+
+    async def _timed(self, work: Callable[[], Awaitable[bytes | None]]) -> bytes | None:
+        start = time.perf_counter()
+        try:
+            return await work()
+        finally:
+            self.cost += time.perf_counter() - start
 
     def _turn(self) -> None:
         self.turned.set()

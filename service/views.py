@@ -21,23 +21,23 @@ from service.engine import Engine, Moment, seconds_left
 DEFAULT_METRICS = ("relmse", "mse_cross", "mse")  # the first that has values
 
 
-def experiment(store: Store, found: Experiment, rate: float | None) -> dict[str, Any]:
+def experiment(store: Store, found: Experiment, engine: Engine) -> dict[str, Any]:
     """``schemas.Experiment``: an experiment and how far it is."""
-    standing = experiments.standing(store, found.id)
+    standing = engine.standings.of(store, found.id)
     return {
         "id": found.id, "name": found.name, "state": standing.state, "created_at": found.created_at,
         "cells": standing.cells, "references": standing.references, "had": standing.had, "wanted": standing.wanted,
         "failed": standing.failed,
-        "seconds_left": None if standing.finished else seconds_left(store, found.id, rate),
+        "seconds_left": None if standing.finished else seconds_left(store, found.id, engine.moment.rate),
     }  # fmt: skip
 
 
-def all_experiments(store: Store, rate: float | None) -> list[dict[str, Any]]:
+def all_experiments(store: Store, engine: Engine) -> list[dict[str, Any]]:
     """Newest first."""
-    return [experiment(store, found, rate) for found in reversed(experiments.everything(store))]
+    return [experiment(store, found, engine) for found in reversed(experiments.everything(store))]
 
 
-def detail(store: Store, found: Experiment, rate: float | None) -> schemas.ExperimentDetail:
+def detail(store: Store, found: Experiment, engine: Engine) -> schemas.ExperimentDetail:
     """An experiment with its axes."""
     revision = store.revision()
     grid = json.loads(found.grid)
@@ -54,7 +54,7 @@ def detail(store: Store, found: Experiment, rate: float | None) -> schemas.Exper
         if not (store.one("scene_by_digest", digest=scene["digest"]) or {}).get("builtin")
     }
     return schemas.ExperimentDetail(
-        **experiment(store, found, rate), revision=revision, scenes=scenes,
+        **experiment(store, found, engine), revision=revision, scenes=scenes,
         integrators=[_label("integrator", item) for item in grid["integrators"]],
         samplers=[_label("sampler", item) for item in grid["samplers"]], spp=grid["spp"], sweeps={},
         replicates=grid["replicates"], metrics=[metric_info(name) for name in METRICS],
@@ -104,7 +104,7 @@ def update(store: Store, found: Experiment, after: int, engine: Engine, moment: 
     page = None if reload else cells.page(store, found.id, after=after, limit=cells.PAGE)
     too_many = page is not None and page.next is not None
     return {
-        "revision": moment.revision, "experiment": experiment(store, found, moment.rate),
+        "revision": moment.revision, "experiment": experiment(store, found, engine),
         "worker": worker(engine, moment),
         "reload": reload or too_many, "cells": [] if page is None or too_many else page.cells,
     }  # fmt: skip

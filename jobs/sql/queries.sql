@@ -384,6 +384,12 @@ order by wanted.position limit :limit;
 -- name: experiment_touched
 select exists (select 1 from event where revision > :after and experiment_id = :experiment_id);
 
+-- name: standing_touched
+select exists (select 1 from event where revision > :after and experiment_id = :experiment_id)
+    or exists (
+        select 1 from event cross join experiment_cell as wanted on wanted.cell_id = event.cell_id
+        where event.revision > :after and wanted.experiment_id = :experiment_id);
+
 -- name: cell_by_id
 select cell.*, scene.name as scene_name from cell join scene on scene.id = cell.scene_id where cell.id = :id;
 

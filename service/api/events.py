@@ -90,7 +90,7 @@ def _overview(engine: Engine, moment: Moment) -> bytes:
     with engine.readers.lend() as store:
         data = {
             "revision": moment.revision,
-            "experiments": views.all_experiments(store, moment.rate),
+            "experiments": views.all_experiments(store, engine),
             "worker": views.worker(engine, moment),
         }
     return event("update", views.to_json(data), moment.revision)

@@ -43,7 +43,7 @@ def list_experiments(
     name: Annotated[str | None, Query(max_length=200, description="only those of this name")] = None,
 ) -> Response:
     """Every experiment with its state and progress, newest first."""
-    found = views.all_experiments(store, engine.moment.rate)
+    found = views.all_experiments(store, engine)
     return _json([item for item in found if name is None or item["name"] == name])
 
 
@@ -70,7 +70,7 @@ async def submit(
 @router.get("/{experiment_id}")
 def show(engine: EngineDep, store: StoreDep, found: ExperimentDep) -> schemas.ExperimentDetail:
     """One experiment with its axes, metrics and grid."""
-    return views.detail(store, found, engine.moment.rate)
+    return views.detail(store, found, engine)
 
 
 @router.post("/{experiment_id}/pause")
@@ -187,7 +187,7 @@ def _change(engine: Engine, experiment: int, change: Any, deleted: bool = False)
 
     found = engine.do(checked)
     with engine.readers.lend() as store:
-        return schemas.Experiment(**views.experiment(store, found, engine.moment.rate))
+        return schemas.Experiment(**views.experiment(store, found, engine))
 
 
 def _dry_run(engine: Engine, asked: schemas.Submission, key: str | None) -> Response:
@@ -202,7 +202,7 @@ def _submit(engine: Engine, asked: schemas.Submission, key: str | None) -> Respo
         before = store.one("experiment_by_digest", digest=wanted.grid.digest)
     found, _ = engine.do(lambda store, _: experiments.submit(store, wanted, engine.artifacts.scenes, key))
     with engine.readers.lend() as store:
-        answer = _json(views.experiment(store, found, engine.moment.rate), 200 if before else 201)
+        answer = _json(views.experiment(store, found, engine), 200 if before else 201)
     answer.headers["location"] = f"/api/experiments/{found.id}"
     return answer
 
