@@ -96,6 +96,20 @@ class Store:
                 raise
 
     @contextlib.contextmanager
+    def moment(self) -> Iterator[None]:
+        """Every query inside sees the same commit, whatever an owner writes meanwhile."""
+        if self.connection.in_transaction:
+            yield
+            return
+        with told(self.path):
+            self.connection.execute("begin")
+            try:
+                yield
+            finally:
+                with contextlib.suppress(apsw.Error):  # the error that ended the block is the one to tell
+                    self.connection.execute("rollback")
+
+    @contextlib.contextmanager
     def without_foreign_keys(self) -> Iterator[None]:
         """Rows may be deleted in any order; the caller leaves none that points nowhere. Not inside a transaction."""
         self.connection.pragma("foreign_keys", False)

@@ -399,6 +399,24 @@ select id, started_at, ended_at, machine, device, outcome, error, log from attem
 -- name: images
 select k, image from replicate where cell_id = :cell_id and role = :role order by k;
 
+-- name: made_on
+-- The conditions under which an experiment's pictures were made, with the first and the last picture of each.
+select distinct
+    machine, device, threads, neighbours, count(*) over alike as pictures,
+    sum(render_seconds) over alike as render_seconds, sum(compile_seconds) over alike as compile_seconds,
+    min(finished_at) over alike as first_at, max(finished_at) over alike as last_at,
+    first_value(image) over (alike order by finished_at, id) as first_image,
+    first_value(image) over (alike order by finished_at desc, id desc) as last_image
+from replicate
+where id in (
+    select replicate.id
+    from experiment_cell as wanted
+    join replicate
+        on replicate.cell_id = wanted.cell_id and replicate.role = wanted.role and replicate.k < wanted.replicates
+    where wanted.experiment_id = :experiment_id)
+window alike as (partition by machine, device, threads, neighbours)
+order by first_at;
+
 
 
 -- Results ----------------------------------------------------------------------------------------------------------

@@ -60,6 +60,24 @@ def test_a_reader_sees_the_last_commit_and_cannot_write(store, data):
         reader.insert("add_event", at="now", what="x", cell_id=None, experiment_id=None)
 
 
+def test_queries_of_one_moment_agree_while_the_owner_writes(store, data):
+    reader = Store.read(data)
+    with reader.moment():
+        assert reader.revision() == 0
+        store.insert("add_event", at="now", what="x", cell_id=None, experiment_id=None)
+        with reader.moment():
+            assert reader.revision() == 0
+    assert reader.revision() == 1
+    with pytest.raises(ZeroDivisionError), reader.moment():
+        raise ZeroDivisionError
+    with store.moment(), reader.moment():
+        assert store.revision() == reader.revision() == 1
+    with store.transaction(), store.moment():  # an owner's look at what it is about to commit
+        store.insert("add_event", at="now", what="x", cell_id=None, experiment_id=None)
+        assert store.revision() == 2
+    assert reader.revision() == 2
+
+
 WRITER = """
 import sys
 from pathlib import Path
