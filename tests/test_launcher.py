@@ -178,6 +178,13 @@ def test_a_removal_that_was_killed_halfway_recovers(checkout):
     assert not list(checkout.folder.glob(".venv.old-*"))
 
 
+def test_a_preparation_that_was_killed_at_its_very_beginning_recovers(checkout):
+    """Between the folder and its stamp: what is there is the stamp's unfinished file, and nobody's .venv."""
+    (checkout.folder / ".venv").mkdir()
+    (checkout.folder / ".venv/dartboard.json.new").touch()
+    assert checkout.run("status")[0] == 0
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 130)])
 def test_an_interrupted_preparation_says_so(checkout, number, code):
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a background job ignores it, and children inherit that
@@ -261,6 +268,36 @@ def test_without_llvm_a_command_that_draws_looks_for_one_at_each_start(prepared)
     for _ in range(2):
         assert "DARTBOARD_LLVM=off" in prepared.run("run")[2]
     assert prepared.run("results")[2] == ""
+
+
+def test_the_tests_of_the_dashboard_need_node(prepared):
+    """A developer without it is told what is left out; CI is told what is missing, before it tests anything."""
+    bare = {"PATH": str(prepared.folder / "no such folder")}
+    _, _, err = prepared.run("test", env=bare)
+    assert "skipped tsc and the tests of the dashboard's modules: there is no node" in err
+    assert "test: failed: ruff check, ruff format, mypy, pytest" in err  # this checkout has none of them
+    code, _, err = prepared.run("test", env={**bare, "CI": "true"})
+    assert code == 3
+    assert "cannot check the dashboard: there is no node; install Node.js" in err
+    assert "pytest" not in err
+
+
+def test_the_type_checker_is_installed_once(checkout):
+    """And again when its lock has changed; both before the tests that take longest."""
+    (checkout.folder / "web/node_modules").mkdir(parents=True)
+    (checkout.folder / "tests/web").mkdir(parents=True)
+    (checkout.folder / "tests/web/one.mjs").touch()
+    (checkout.folder / "web/package-lock.json").write_text("{}")
+    tools = checkout.folder / "tools"
+    tools.mkdir()
+    for name in ("npm", "node"):
+        (tools / name).write_text('#!/bin/sh\n[ "$1" = ci ] && : > node_modules/.package-lock.json\nexit 0\n')
+        (tools / name).chmod(0o755)
+    path = {"PATH": f"{tools}:{os.environ['PATH']}"}
+    ran = [re.findall(r"test: ([\w ]+) ok", checkout.run("test", env=path)[2]) for _ in range(2)]
+    assert ran == [["npm ci", "tsc", "node"], ["tsc", "node"]]
+    os.utime(checkout.folder / "web/package-lock.json", (2e9, 2e9))
+    assert "npm ci ok" in checkout.run("test", env=path)[2]
 
 
 def test_the_launcher_parses_in_an_old_python():
