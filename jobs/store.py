@@ -170,7 +170,7 @@ class Store:
                 f"the file system of {self.path.parent} cannot hold a database that is read while it is written; "
                 f"choose a --data DIR on a local disk"
             )
-        with self.transaction():
+        with self.without_foreign_keys(), self.transaction():  # a step may make a table anew that others refer to
             sql.migrate(self.connection, sql.migrations())
 
 

@@ -31,7 +31,7 @@ create index cell_revision on cell (revision);
 
 -- One grid that somebody asked for.
 create table experiment (
-    id           integer primary key,
+    id           integer primary key autoincrement,      -- never given again: addresses of pages hold it
     digest       text not null unique,
     name         text not null,
     created_at   text not null,

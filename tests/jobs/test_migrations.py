@@ -8,10 +8,20 @@ from pathlib import Path
 import apsw
 import pytest
 
-from jobs import sql
+from jobs import queue, sql, trash
 from jobs.errors import DataDirectoryProblem
 from jobs.store import FILE, Store
-from tests.jobs.conftest import select
+from tests.jobs.conftest import assert_sound, select, submit
+
+VERSION_1 = """
+insert into scene values (1, 's', 'box', 'scene.xml', 1);
+insert into cell (id, digest, state, revision, scene_id, spp, pixels, estimand, spec)
+values (5, 'c', 'cancelled', 1, 1, 4, 9, 'e', '{}');
+insert into experiment values (3, 'a', 'old', 'then', null, '{}'), (7, 'b', 'stopped', 'then', 'later', '{}');
+insert into experiment_cell (experiment_id, position, cell_id, role, replicates, spp_asked, scene, integrator, sampler)
+values (7, 0, 5, 'cell', 2, 4, 'box', 'path', 'independent');
+insert into event (at, what, experiment_id) values ('then', 'submit', 7);
+"""
 
 
 def shape(connection: apsw.Connection) -> dict[str, object]:
@@ -23,7 +33,12 @@ def shape(connection: apsw.Connection) -> dict[str, object]:
             found[name] = [
                 list(connection.execute(f"pragma {what}({name})"))
                 for what in ("table_xinfo", "foreign_key_list", "index_list")
-            ] + ["strict" in plain, "without rowid" in plain, sorted(re.findall(r"check \(.*?\)\)?", plain))]
+            ] + [
+                "strict" in plain,
+                "without rowid" in plain,
+                "autoincrement" in plain,
+                sorted(re.findall(r"check \(.*?\)\)?", plain)),
+            ]
         elif kind == "index":
             found[name] = [table, list(connection.execute(f"pragma index_xinfo({name})")), plain]
         else:
@@ -65,6 +80,34 @@ def test_a_database_of_any_older_version_is_brought_up_to_date(data):
         store = Store.open(folder)
         assert shape(store.connection) == shape(_fresh())
         store.close()
+
+
+def test_version_1_keeps_its_rows_and_its_references(data):
+    """A table that is made anew has every row under its id, and what refers to it still does."""
+    data.mkdir()
+    old = apsw.Connection(str(data / FILE))
+    sql.migrate(old, sql.migrations()[:1])
+    old.execute(VERSION_1)
+    old.close()
+    store = Store.open(data)
+    assert_sound(store)
+    columns = "id, digest, name, created_at, cancelled_at, grid, paused_at, deleted_at"
+    assert select(store, f"select {columns} from experiment order by id") == [
+        (3, "a", "old", "then", None, "{}", None, None),
+        (7, "b", "stopped", "then", "later", "{}", None, None),
+    ]
+    assert select(store, "select state from standing") == [("cancelled",)]
+    with pytest.raises(apsw.ConstraintError, match="FOREIGN KEY"):
+        store.connection.execute("insert into event (at, what, experiment_id) values ('now', 'submit', 4)")
+    store.close()
+
+
+def test_the_id_of_an_experiment_that_is_gone_is_never_given_again(store, artifacts):
+    """Else the address of a deleted experiment would show another."""
+    first, second = submit(store, name="first"), submit(store, name="second")
+    queue.delete(store, second.id)
+    assert trash.empty(store, artifacts, seconds=-1) == 1
+    assert submit(store, name="third").id > second.id > first.id
 
 
 def test_a_step_that_breaks_leaves_the_old_version_whole():

@@ -1,10 +1,26 @@
 -- 0002_service.sql
 -- What a server needs: pausing, deleting with a way back, submitting once under a key, and the points of plots kept
 -- ready, so that a page of a large grid is read and not computed. Old experiments are neither paused nor deleted; their
--- points are filled in by the next owner (jobs/points.py).
+-- points are filled in by the next owner (jobs/points.py). The id of an experiment that is gone is never given to
+-- another: addresses of pages hold it.
 
-alter table experiment add column paused_at text;
-alter table experiment add column deleted_at text;
+drop view standing;
+
+create table experiment_of_2 (
+    id           integer primary key autoincrement,
+    digest       text not null unique,
+    name         text not null,
+    created_at   text not null,
+    cancelled_at text,
+    grid         text not null,
+    paused_at    text,
+    deleted_at   text
+) strict;
+insert into experiment_of_2 (id, digest, name, created_at, cancelled_at, grid)
+select id, digest, name, created_at, cancelled_at, grid from experiment;
+drop table experiment;
+alter table experiment_of_2 rename to experiment;
+create index experiment_name on experiment (name);
 
 create table submission (
     key           text primary key,
@@ -25,7 +41,6 @@ create table point (
     primary key (experiment_id, position, name)
 ) strict, without rowid;
 
-drop view standing;
 create view standing as
 select
     wanted.*,
