@@ -18,10 +18,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from jobs import inbox, points, queue
+from jobs import experiments, inbox, points, queue
 from jobs.artifacts import Artifacts
 from jobs.executors.base import Done, Event, Executor, Failed, Finished, Order, Passed, Released, Started
+from jobs.experiments import Experiment
 from jobs.measure import Measurer
+from jobs.plan import Plan
 from jobs.queue import Work
 from jobs.store import Store
 
@@ -117,6 +119,12 @@ class Dispatcher:
             queue.release(self.store, work)
         self.under_way.clear()
 
+    def submit(self, wanted: Plan, key: str | None = None) -> tuple[Experiment, int]:
+        """``experiments.submit``; what the plan shares with others is measured against its own references."""
+        found, new = experiments.submit(self.store, wanted, self.artifacts.scenes, key)
+        self.measurer.look_into(found.id)
+        return found, new
+
     def cancel(self, experiment: int) -> None:
         """Stop an experiment for good (until retry), and what is drawn for it alone at once."""
         self._drop(queue.cancel(self.store, experiment))
@@ -195,11 +203,13 @@ class Dispatcher:
         """Move a finished picture into place, commit its row, and queue it for measuring."""
         image = self.artifacts.picture(work.digest, event.role, event.k)
         self.artifacts.adopt(self.artifacts.work / event.file, image)
-        replicate = queue.finish_replicate(
-            self.store, work, event.role, event.k, image=image, seed=event.seed, render_seconds=event.render_seconds,
-            compile_seconds=event.compile_seconds, threads=event.threads, neighbours=event.neighbours,
-        )  # fmt: skip
-        points.refresh(self.store, [work.cell_id])
+        with self.store.transaction():
+            replicate = queue.finish_replicate(
+                self.store, work, event.role, event.k, image=image, seed=event.seed,
+                render_seconds=event.render_seconds, compile_seconds=event.compile_seconds, threads=event.threads,
+                neighbours=event.neighbours,
+            )  # fmt: skip
+            points.refresh(self.store, [work.cell_id])
         self.measurer.add(replicate)
 
     def _answer_requests(self) -> None:

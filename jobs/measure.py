@@ -49,6 +49,11 @@ class Measurer:
         points.fill_gaps(self.store)
         self.searches.extend((row["reference_id"], 0) for row in self.store.rows("reference_ids"))
 
+    def look_into(self, experiment: int) -> None:
+        """What an experiment shares with others and nobody has measured against its references."""
+        rows = self.store.rows("references_of_experiment", experiment_id=experiment)
+        self.searches.extend((row["reference_id"], 0) for row in rows)
+
     def add(self, replicate_id: int) -> None:
         """A replicate was just committed: it can be measured, or it completes a reference."""
         replicate = self.store.one("replicate_by_id", id=replicate_id)

@@ -16,6 +16,7 @@ from types import FrameType
 import uvicorn
 
 from jobs import experiments, grid, owner, plan
+from jobs.dispatcher import Dispatcher
 from jobs.store import Store
 from renderer import devices
 from renderer.errors import EnvironmentProblem
@@ -91,9 +92,9 @@ def submit_demo(engine: Engine) -> None:
     """The demo grid, if there is no experiment yet: the first start shows something."""
     wanted = plan.expand(grid.read(DEMO))
 
-    def submit(store: Store, _: object) -> None:
+    def submit(store: Store, dispatcher: Dispatcher) -> None:
         if store.one("experiment_by_id", id=1) is None and not experiments.everything(store):
-            experiments.submit(store, wanted, engine.artifacts.scenes)
+            dispatcher.submit(wanted)
 
     engine.do(submit)
 

@@ -470,6 +470,10 @@ where wanted.experiment_id = :experiment_id and wanted.role = 'cell';
 -- name: reference_ids
 select distinct reference_id from experiment_cell where reference_id is not null order by reference_id;
 
+-- name: references_of_experiment
+select distinct reference_id from experiment_cell
+where experiment_id = :experiment_id and reference_id is not null order by reference_id;
+
 -- name: cells_of_reference
 select distinct cell_id from experiment_cell
 where reference_id = :reference_id and cell_id > :after

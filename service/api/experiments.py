@@ -12,9 +12,10 @@ from fastapi.responses import StreamingResponse
 
 from jobs import cells as cell_views
 from jobs import experiments, queue, results, trash
+from jobs.dispatcher import Dispatcher
 from jobs.experiments import Experiment
 from jobs.plan import Plan
-from jobs.store import now
+from jobs.store import Store, now
 from service import bodies, schemas, submission, views
 from service.deps import EngineDep, ExperimentDep, ExperimentId, StoreDep
 from service.engine import Engine
@@ -199,10 +200,14 @@ def _dry_run(engine: Engine, asked: schemas.Submission, key: str | None) -> Resp
 def _submit(engine: Engine, asked: schemas.Submission, key: str | None) -> Response:
     with engine.readers.lend() as store:
         wanted: Plan = submission.planned(store, engine.artifacts, asked)
-        before = store.one("experiment_by_digest", digest=wanted.grid.digest)
-    found, _ = engine.do(lambda store, _: experiments.submit(store, wanted, engine.artifacts.scenes, key))
+
+    def change(store: Store, dispatcher: Dispatcher) -> tuple[Experiment, bool]:
+        there = store.one("experiment_by_digest", digest=wanted.grid.digest) is not None
+        return dispatcher.submit(wanted, key)[0], there
+
+    found, there = engine.do(change)
     with engine.readers.lend() as store:
-        answer = _json(views.experiment(store, found, engine), 200 if before else 201)
+        answer = _json(views.experiment(store, found, engine), 200 if there else 201)
     answer.headers["location"] = f"/api/experiments/{found.id}"
     return answer
 
