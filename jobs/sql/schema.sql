@@ -13,7 +13,7 @@ create table scene (
 
 -- One cell: what is rendered, whoever wants it. Only jobs/queue.py changes a state.
 create table cell (
-    id          integer primary key,
+    id          integer primary key autoincrement,       -- never given again: addresses of pictures hold it
     digest      text not null unique,
     state       text not null default 'queued' check (state in ('queued', 'running', 'done', 'failed', 'cancelled')),
     crashes     integer not null default 0 check (crashes >= 0), -- of its render process since its last replicate

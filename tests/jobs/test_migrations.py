@@ -97,17 +97,22 @@ def test_version_1_keeps_its_rows_and_its_references(data):
         (7, "b", "stopped", "then", "later", "{}", None, None),
     ]
     assert select(store, "select state from standing") == [("cancelled",)]
+    assert select(store, "select id, digest, state, revision, spec from cell") == [(5, "c", "cancelled", 1, "{}")]
     with pytest.raises(apsw.ConstraintError, match="FOREIGN KEY"):
         store.connection.execute("insert into event (at, what, experiment_id) values ('now', 'submit', 4)")
     store.close()
 
 
-def test_the_id_of_an_experiment_that_is_gone_is_never_given_again(store, artifacts):
-    """Else the address of a deleted experiment would show another."""
-    first, second = submit(store, name="first"), submit(store, name="second")
+def test_an_id_that_is_gone_is_never_given_again(store, artifacts):
+    """Else the address of a deleted experiment would show another, and the one of its pictures other pictures."""
+    submit(store, name="first")
+    second = submit(store, name="second", spp=[9])
+    cells = {row[0] for row in select(store, "select id from cell")}
     queue.delete(store, second.id)
     assert trash.empty(store, artifacts, seconds=-1) == 1
-    assert submit(store, name="third").id > second.id > first.id
+    assert submit(store, name="third", spp=[16]).id > second.id
+    (new,) = select(store, "select id from cell where spp = 16")
+    assert new[0] > max(cells)
 
 
 def test_a_step_that_breaks_leaves_the_old_version_whole():
