@@ -16,7 +16,7 @@ from service.progress import Bars, cell_name, replicate_name
 from service.schemas import Cell, Experiment, ExperimentDetail, Progress, Update, Worker
 
 ENDS = ("done", "failed", "cancelled")  # states that nothing leaves by itself
-MEASURE_SECONDS = 30.0  # after the last picture, for its errors: each takes milliseconds
+MEASURE_SECONDS = 10.0  # after the last picture, for its errors: each takes milliseconds
 LOOK_SECONDS = 0.3
 
 
@@ -97,13 +97,15 @@ def measured(client: Client, start: ExperimentDetail) -> list[Cell]:
     deadline = time.monotonic() + MEASURE_SECONDS
     while True:
         cells = list(client.cells(start.id))
-        if time.monotonic() > deadline or not any(_lacks_errors(cell) for cell in cells):
+        drawn = {cell.cell for cell in cells if cell.role == "reference" and cell.state == "done"}
+        missing = any(_unmeasured(cell) for cell in cells if cell.state == "done" and cell.reference in drawn)
+        if not missing or time.monotonic() > deadline:
             return cells
         time.sleep(LOOK_SECONDS)
 
 
-def _lacks_errors(cell: Cell) -> bool:
-    return cell.state == "done" and cell.role == "cell" and cell.reference is not None and not cell.metrics
+def _unmeasured(cell: Cell) -> bool:
+    return max((n for _, _, n in cell.metrics.values()), default=0) < min(cell.had, cell.wanted)
 
 
 @contextlib.contextmanager
