@@ -7,7 +7,7 @@
  * needed, so that the list is there at once.
  */
 import { html, render, useEffect, useErrorBoundary, useLayoutEffect, useRef, useState } from "./vendor/preact-htm.js";
-import { captureLinks, useRoute } from "./address.js";
+import { captureLinks, navigate, useRoute } from "./address.js";
 import { useLive } from "./events.js";
 import { Header } from "./parts/header.js";
 import { toast, Toasts } from "./parts/toast.js";
@@ -15,8 +15,7 @@ import { useKeys } from "./keys.js";
 import { Help } from "./views/help.js";
 import { List } from "./views/list.js";
 import { New } from "./views/new.js";
-import { Crashed, Loading, NotFound } from "./views/states.js";
-import { navigate } from "./address.js";
+import { Crashed, Loading, NotFound, ServerGone } from "./views/states.js";
 
 /** @typedef {import("./vendor/preact-htm.js").Child} Child */
 
@@ -33,10 +32,9 @@ function App() {
   ]);
   return html`<a class="skip" href="#content">Skip to the content</a>
     <${Header} path=${path} worker=${live.worker} status=${live.status} onHelp=${() => setHelp(true)} />
-    <${Lost} status=${live.status} />
     <${Main} path=${path} />
     ${help && html`<${Help} onClose=${() => setHelp(false)} />`}
-    <${Toasts} />`;
+    <${Toasts}><${Lost} status=${live.status} /><//>`;
 }
 
 /** The view, under the one place where a bug in it ends. Another address starts afresh. @param {{path: string}} props */
@@ -77,15 +75,15 @@ function ExperimentPage({ id }) {
   useEffect(() => {
     import("./views/experiment.js").then(setView, setError);
   }, []);
+  // A file that does not come is a TypeError; browsers remember it, so only loading the page again asks for it again.
+  if (error instanceof TypeError) return html`<${ServerGone} onRetry=${() => location.reload()} />`;
   if (error) throw error;
   return view ? html`<${view.Experiment} id=${id} />` : html`<${Loading} />`;
 }
 
 /** Over the page, not above it: nothing moves when it comes and goes. @param {{status: import("./events.js").Status}} props */
 function Lost({ status }) {
-  return html`<div class="lost" role="status" aria-live="polite">
-    ${status === "down" && html`<p><span class="pulse"></span>The server is gone; trying again…</p>`}
-  </div>`;
+  return status === "down" && html`<p class="lost"><span class="pulse"></span>The server is gone; trying again…</p>`;
 }
 
 /** A failure that nothing handled, told once instead of hidden in the console. @param {unknown} reason */
@@ -97,4 +95,5 @@ function unhandled(reason) {
 addEventListener("unhandledrejection", (event) => unhandled(event.reason));
 captureLinks();
 const root = document.getElementById("app");
+root?.replaceChildren();
 if (root) render(html`<${App} />`, root);

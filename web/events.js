@@ -20,7 +20,7 @@ import { overviewEvents } from "./api.js";
  * @property {(status: Status) => void} [status]
  */
 
-const RETRY_MS = [300, 1000, 2000, 4000]; // soon, then rarer
+const RETRY_MS = [300, 1000, 2000]; // soon, then rarer
 const DOWN_MS = 2500; // a server that restarts is back sooner; longer is worth a word
 const HIDDEN_MS = 5000; // a glance at another tab should not cost a reconnection
 
@@ -50,8 +50,8 @@ export function follow(path, handlers, { after } = {}) {
   let timer;
   /** @type {number | undefined} */
   let sleep;
-  /** @type {number | undefined} */
-  let alarm;
+  /** Fires once the server has been away for long; -1 from then on. @type {number | undefined} */
+  let alarm = live.status === "down" ? -1 : undefined;
 
   /** @param {Status} status */
   function report(status) {

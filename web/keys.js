@@ -19,7 +19,7 @@ import { useEffect, useRef } from "./vendor/preact-htm.js";
 /** @type {Group[]} */
 const groups = [];
 
-/** Every registered group, the page's first. @returns {readonly Group[]} */
+/** Every registered group: those of the view, then those of the page around it. @returns {readonly Group[]} */
 export function registered() {
   return groups;
 }

@@ -1,8 +1,9 @@
 // @ts-check
 /**
- * A button that opens a short list of actions. Arrow keys move, Escape and a click elsewhere close.
+ * A button that opens a short list of actions. Arrow keys move, Escape and a click elsewhere close. The list is made
+ * when it opens: a page may hold hundreds of these.
  */
-import { html, useRef, useState } from "../vendor/preact-htm.js";
+import { html, useLayoutEffect, useRef, useState } from "../vendor/preact-htm.js";
 import { Icon } from "./icons.js";
 
 /** @typedef {{label: string, icon: import("./icons.js").IconName, run: () => void, danger?: boolean}} Action */
@@ -15,6 +16,24 @@ export function Menu({ label, actions }) {
   const button = useRef(/** @type {HTMLButtonElement | null} */ (null));
   const list = useRef(/** @type {HTMLDivElement | null} */ (null));
 
+  useLayoutEffect(() => {
+    if (!open) return undefined;
+    list.current?.showPopover();
+    place();
+    items()[0]?.focus();
+    /** @param {Event} event */
+    const elsewhere = (event) => {
+      const inside = [list, button].some(({ current }) => event.target instanceof Node && current?.contains(event.target));
+      if (!inside) hide();
+    };
+    addEventListener("scroll", place, { passive: true });
+    addEventListener("pointerdown", elsewhere);
+    return () => {
+      removeEventListener("scroll", place);
+      removeEventListener("pointerdown", elsewhere);
+    };
+  }, [open]);
+
   /** The list stands below the button, above it near the foot of the window. */
   function place() {
     if (!button.current || !list.current) return;
@@ -25,17 +44,8 @@ export function Menu({ label, actions }) {
     style.left = `${Math.max(GAP, at.right - offsetWidth)}px`;
   }
 
-  /** @param {{newState: string}} event */
-  function toggled(event) {
-    setOpen(event.newState === "open");
-    if (event.newState !== "open") return;
-    place();
-    items()[0]?.focus();
-    addEventListener("scroll", hide, { once: true, passive: true });
-  }
-
   function hide() {
-    list.current?.hidePopover();
+    setOpen(false);
   }
 
   /** @returns {HTMLButtonElement[]} */
@@ -50,7 +60,11 @@ export function Menu({ label, actions }) {
     /** @type {Record<string, number>} */
     const moves = { ArrowDown: here + 1, ArrowUp: here - 1, Home: 0, End: -1 };
     const next = moves[event.key];
-    if (event.key === "Tab") hide();
+    if (event.key === "Tab" || event.key === "Escape") {
+      event.preventDefault();
+      hide();
+      button.current?.focus();
+    }
     if (next === undefined) return;
     event.preventDefault();
     all.at(next % all.length)?.focus();
@@ -70,11 +84,12 @@ export function Menu({ label, actions }) {
       aria-expanded=${open}
       aria-label=${label}
       title=${label}
-      onClick=${() => list.current?.togglePopover()}
+      onClick=${() => setOpen(!open)}
     >
       <${Icon} name="more" />
     </button>
-    <div ref=${list} class="menu" popover="auto" role="menu" aria-label=${label} onToggle=${toggled} onKeyDown=${key}>
+    ${open &&
+    html`<div ref=${list} class="menu" popover="manual" role="menu" aria-label=${label} onKeyDown=${key}>
       ${actions.map(
         (action) => html`<button
           key=${action.label}
@@ -86,5 +101,5 @@ export function Menu({ label, actions }) {
           <${Icon} name=${action.icon} /> ${action.label}
         </button>`,
       )}
-    </div>`;
+    </div>`}`;
 }

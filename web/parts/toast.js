@@ -49,7 +49,8 @@ function dismiss(id) {
   put(notes.filter((note) => note.id !== id));
 }
 
-export function Toasts() {
+/** Notes, and above them what else the whole page has to say. @param {{children?: import("../vendor/preact-htm.js").Child}} props */
+export function Toasts({ children }) {
   const [, redraw] = useState(0);
   useEffect(() => {
     const watcher = () => redraw((count) => count + 1);
@@ -57,6 +58,7 @@ export function Toasts() {
     return () => void watchers.delete(watcher);
   }, []);
   return html`<div class="toasts" role="status" aria-live="polite">
+    ${children}
     ${notes.map(
       ({ id, text, action, tone }) =>
         html`<div class=${`toast ${tone ?? ""}`} key=${id}>

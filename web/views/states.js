@@ -3,9 +3,10 @@
  * What a page shows when it has nothing to show: it loads, is empty, does not exist, was deleted, cannot be reached,
  * or broke. Each says what is the matter and the way on.
  */
-import { html, useEffect, useState } from "../vendor/preact-htm.js";
+import { html, useEffect, useRef, useState } from "../vendor/preact-htm.js";
 import { ApiProblem, experiments, Unreachable } from "../api.js";
 import { navigate } from "../address.js";
+import { useLive } from "../events.js";
 import { told } from "../parts/toast.js";
 
 /** @typedef {import("../vendor/preact-htm.js").Child} Child */
@@ -97,8 +98,14 @@ export function DeletedExperiment({ id, name, detail, onRestored }) {
   <//>`;
 }
 
-/** @param {{onRetry?: () => void}} props */
+/** Asks again as soon as the server is back. @param {{onRetry?: () => void}} props */
 export function ServerGone({ onRetry }) {
+  const { status } = useLive();
+  const away = useRef(false);
+  useEffect(() => {
+    if (status === "live" && away.current) onRetry?.();
+    away.current = status !== "live";
+  }, [status]);
   return html`<${Message} title="The server does not answer">
     <p>It has ended, or the network between is down. What is finished is safe on its disk.</p>
     <p class="muted">Start it again with <code>./dartboard up</code>; this page goes on by itself.</p>

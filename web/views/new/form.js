@@ -37,12 +37,12 @@ export const START = {
   integrators: [choice("path")],
   spp: ["4", "16", "64"],
   replicates: "4",
-  width: "",
-  height: "",
+  width: "128",
+  height: "128",
   depth: "",
   rfilter: choice("box"),
   colour: "rgb",
-  reference: { wanted: true, integrator: "path", sampler: "independent", spp: "4096" },
+  reference: { wanted: true, integrator: "path", sampler: "multijitter", spp: "2048" },
 };
 
 /** `stratified:jitter=false` → a choice. @param {string} text @returns {Choice} */

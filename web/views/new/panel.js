@@ -13,7 +13,7 @@ import { placeOf } from "./fields.js";
 const COPIED_MS = 1500;
 
 /**
- * `beside`: whether the form shows faults beside its fields; else all are listed here.
+ * `beside`: whether the form is there, with faults beside its fields; else the grid is edited as text.
  * @param {{estimate: Estimate, beside: boolean, sending: boolean, onSubmit: () => void}} props
  */
 export function Panel({ estimate, beside, sending, onSubmit }) {
@@ -26,7 +26,7 @@ export function Panel({ estimate, beside, sending, onSubmit }) {
       ${result && faults.length === 0 && html`<p class="hint number narrow-only">about ${duration(result.seconds)}, ${bytes(result.disk_bytes)}</p>`}
       <${Submit} estimate=${estimate} sending=${sending} onSubmit=${onSubmit} />
     </div>
-    ${result && faults.length === 0 && html`<${GridText} toml=${result.toml} />`}
+    ${beside && result && faults.length === 0 && html`<${GridText} toml=${result.toml} />`}
   </aside>`;
 }
 
@@ -122,9 +122,11 @@ function GridText({ toml }) {
   return html`<details class="grid-text">
     <summary>The grid as TOML</summary>
     <pre tabindex="0">${toml}</pre>
-    <button class="button" type="button" onClick=${copy}>
-      <${Icon} name=${copied ? "check" : "copy"} /> ${copied ? "Copied" : "Copy"}
-    </button>
-    <span class="hint">for <code>./dartboard run grid.toml</code></span>
+    <div class="grid-text-foot">
+      <button class="button" type="button" onClick=${copy}>
+        <${Icon} name=${copied ? "check" : "copy"} /> ${copied ? "Copied" : "Copy"}
+      </button>
+      <span class="hint">a grid file for <code>./dartboard run</code></span>
+    </div>
   </details>`;
 }

@@ -124,9 +124,9 @@ export function Pictures({ form, change, catalog, faults }) {
 export function ReferenceFields({ reference, onChange, catalog }) {
   /** @param {Partial<Form["reference"]>} change */
   const set = (change) => onChange({ ...reference, ...change });
-  return html`<div class="row" role="radiogroup" aria-label="Reference">
-      <button type="button" class="chip" role="radio" aria-checked=${reference.wanted} aria-pressed=${reference.wanted} onClick=${() => set({ wanted: true })}>render one</button>
-      <button type="button" class="chip" role="radio" aria-checked=${!reference.wanted} aria-pressed=${!reference.wanted} onClick=${() => set({ wanted: false })}>none</button>
+  return html`<div class="row" role="group" aria-label="Reference">
+      <button type="button" class="chip" aria-pressed=${reference.wanted} onClick=${() => set({ wanted: true })}>render one</button>
+      <button type="button" class="chip" aria-pressed=${!reference.wanted} onClick=${() => set({ wanted: false })}>none</button>
       ${!reference.wanted && html`<p class="hint">Without a reference there are pictures and times, but no errors and no curves.</p>`}
     </div>
     ${reference.wanted &&
