@@ -184,9 +184,13 @@ def cancel(store: Store, experiment: int) -> list[int]:
     """
     Stop wanting what an experiment has not got; what other live experiments want goes on.
 
-    The ids of the cells that were running for it alone: whoever renders them should kill that now.
+    The ids of the cells that were running for it alone: whoever renders them should kill that now. A pause ends with
+    it: what is cancelled does not wait.
     """
-    return _stop(store, experiment, "set_cancelled", "cancelled")
+    with store.transaction():
+        stopped = _stop(store, experiment, "set_cancelled", "cancelled")
+        store.run("set_paused", experiment_id=experiment, at=None)
+    return stopped
 
 
 def pause(store: Store, experiment: int) -> list[int]:

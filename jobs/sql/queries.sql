@@ -221,7 +221,8 @@ group by role, state;
 select count(*) from experiment_cell where open = 1;
 
 -- name: experiments_of_cell
-select experiment_id as id, scene, integrator, sampler from experiment_cell where cell_id = :cell_id;
+-- Those for which it is drawn now.
+select experiment_id as id, scene, integrator, sampler from experiment_cell where cell_id = :cell_id and open = 1;
 
 -- name: samples_left
 select sum((replicates - had) * 1.0 * spp * pixels)
@@ -387,8 +388,8 @@ select exists (select 1 from event where revision > :after and experiment_id = :
 -- name: standing_touched
 select exists (select 1 from event where revision > :after and experiment_id = :experiment_id)
     or exists (
-        select 1 from event cross join experiment_cell as wanted on wanted.cell_id = event.cell_id
-        where event.revision > :after and wanted.experiment_id = :experiment_id);
+        select 1 from cell indexed by cell_revision cross join experiment_cell as wanted on wanted.cell_id = cell.id
+        where cell.revision > :after and wanted.experiment_id = :experiment_id);
 
 -- name: cell_by_id
 select cell.*, scene.name as scene_name from cell join scene on scene.id = cell.scene_id where cell.id = :id;

@@ -11,10 +11,11 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, precondition, rule
 
-from jobs import experiments, queue, sql
+from jobs import experiments, queue, sql, trash
+from jobs.artifacts import Artifacts
 from jobs.queue import FATAL, MAX_ATTEMPTS, MOVES, RETRIED, MoveRefused
 from jobs.store import Store
-from tests.jobs.conftest import claim, dump, planned, record, select, submit, work_off
+from tests.jobs.conftest import assert_sound, claim, dump, planned, record, select, submit, work_off
 
 STATES = ("queued", "running", "done", "failed", "cancelled")
 NAMES = sorted({name for _, name in MOVES})
@@ -270,6 +271,47 @@ def test_retry_of_a_sound_experiment_starts_nothing(store):
     assert claim(store) is None
 
 
+def test_a_pause_waits_and_going_on_needs_no_retry(store):
+    experiment = submit(store, spp=[1, 2])
+    work = claim(store)
+    assert queue.pause(store, experiment.id) == [work.cell_id]
+    standing = experiments.standing(store, experiment.id)
+    assert (standing.state, standing.finished, standing.count("paused")) == ("paused", True, 3)
+    assert claim(store) is None
+    assert queue.resume(store, experiment.id) == 3
+    assert len(work_off(store)) == 3
+    assert queue.resume(store, experiment.id) == 0
+
+
+def test_what_is_cancelled_during_a_pause_is_cancelled(store):
+    """Else its page would offer to go on, and nothing would."""
+    experiment = submit(store)
+    queue.pause(store, experiment.id)
+    queue.cancel(store, experiment.id)
+    assert experiments.standing(store, experiment.id).state == "cancelled"
+    assert queue.resume(store, experiment.id) == 0
+    assert claim(store) is None
+    assert queue.retry(store, experiment.id) == 3
+    assert experiments.standing(store, experiment.id).state == "queued"
+
+
+def test_a_deleted_experiment_comes_back_as_it_was(store):
+    """Live, paused or cancelled: ``restore`` changes nothing else."""
+    live, paused, cancelled = (submit(store, name=name, spp=[n]) for name, n in (("a", 1), ("b", 2), ("c", 3)))
+    queue.pause(store, paused.id)
+    queue.cancel(store, cancelled.id)
+    for experiment in (live, paused, cancelled):
+        queue.delete(store, experiment.id)
+    assert experiments.everything(store) == []
+    assert claim(store) is None
+    for experiment in (live, paused, cancelled):
+        queue.restore(store, experiment.id)
+    states = [experiments.standing(store, experiment.id).state for experiment in (live, paused, cancelled)]
+    assert states == ["queued", "paused", "cancelled"]
+    assert queue.resume(store, paused.id) == 2
+    assert {work.spec.spp for work in work_off(store)} == {1, 2, 4}
+
+
 PLANS = [
     planned(name="a", spp=[1, 2], replicates=2, reference={"spp": 8, "replicates": 2}),
     planned(name="b", spp=[2, 4], replicates=3, reference={"spp": 16, "replicates": 4}),  # its 4 spp are a's reference
@@ -283,7 +325,7 @@ class Queue(RuleBasedStateMachine):
     Any sequence of what owners, processes and people do, beside a model of what must be so.
 
     pictures  (digest, role, k) that were finished; claimed: attempts under way with what they still have to draw;
-    ended: works whose attempt is over; crashes and failed, by digest; live, by experiment
+    ended: works whose attempt is over; crashes and failed, by digest; marks, by experiment: why it wants nothing now
     """
 
     def __init__(self):
@@ -291,7 +333,8 @@ class Queue(RuleBasedStateMachine):
         self.folder = tempfile.TemporaryDirectory()
         self.store = Store.open(Path(self.folder.name) / "data")
         self.pictures, self.claimed, self.ended = set(), {}, []
-        self.crashes, self.failed, self.live, self.plans = {}, set(), {}, {}
+        self.crashes, self.failed, self.marks, self.plans = {}, set(), {}, {}
+        self.artifacts = Artifacts(self.store.path.parent)
 
     def teardown(self):
         self.store.close()
@@ -304,9 +347,10 @@ class Queue(RuleBasedStateMachine):
     @rule(index=st.sampled_from(range(len(PLANS))))
     def submit_another(self, index):
         experiment, _ = experiments.submit(self.store, PLANS[index], self.store.path.parent / "scenes")
-        self.live[experiment.id] = True
+        self.marks[experiment.id] = set()
         self.plans[experiment.id] = PLANS[index]
 
+    @precondition(lambda self: self.plans)
     @rule(pick=st.none() | st.integers(0, 3))
     def claim(self, pick):
         chosen = None if pick is None else sorted(self.plans)[pick % len(self.plans)]
@@ -329,8 +373,8 @@ class Queue(RuleBasedStateMachine):
         work, left = self._pick(pick)
         if left:
             role, k = left.pop(0)
-            row = record(self.store, work, role, k)
-            assert not again or record(self.store, work, role, k) == row
+            row = self._record(work, role, k)
+            assert not again or self._record(work, role, k) == row
             self.pictures.add((work.digest, role, k))
             self.crashes[work.digest] = 0
 
@@ -366,30 +410,59 @@ class Queue(RuleBasedStateMachine):
         for attempt in list(self.claimed):
             self._end(attempt)
 
+    @precondition(lambda self: self.plans)
     @rule(pick=st.integers(0, 3))
     def cancel(self, pick):
-        experiment = sorted(self.plans)[pick % len(self.plans)]
-        wanted = {cell.spec.digest for _, cell in self._wanted(experiment)}
-        self.live[experiment] = False
-        killed = set(queue.cancel(self.store, experiment))
-        alone = {
-            attempt: work
-            for attempt, (work, _) in self.claimed.items()
-            if work.digest in wanted and not self._is_wanted(work.digest)
-        }
-        assert killed == {work.cell_id for work in alone.values()}
-        for attempt in alone:
-            self._end(attempt)
+        experiment = self._experiment(pick)
+        self._stop(experiment, queue.cancel, {*self.marks[experiment], "cancelled"} - {"paused"})
 
+    @precondition(lambda self: self.plans)
+    @rule(pick=st.integers(0, 3))
+    def pause(self, pick):
+        experiment = self._experiment(pick)
+        self._stop(experiment, queue.pause, self.marks[experiment] or {"paused"})
+
+    @precondition(lambda self: self.plans)
+    @rule(pick=st.integers(0, 3))
+    def delete(self, pick):
+        experiment = self._experiment(pick)
+        self._stop(experiment, queue.delete, {*self.marks[experiment], "deleted"})
+
+    @precondition(lambda self: self.plans)
+    @rule(pick=st.integers(0, 3), move=st.sampled_from([("paused", queue.resume), ("deleted", queue.restore)]))
+    def take_back(self, pick, move):
+        experiment, (mark, take) = self._experiment(pick), move
+        before = dump(self.store)
+        take(self.store, experiment)
+        if mark in self.marks[experiment]:
+            self.marks[experiment].discard(mark)
+        else:
+            assert dump(self.store) == before
+
+    @precondition(lambda self: self.plans)
     @rule(pick=st.integers(0, 3))
     def retry(self, pick):
-        experiment = sorted(self.plans)[pick % len(self.plans)]
-        self.live[experiment] = True
+        experiment = self._experiment(pick)
+        self.marks[experiment] = set()
         for cell in self.plans[experiment].cells:
             if cell.spec.digest in self.failed and self._misses(cell):
                 self.failed.discard(cell.spec.digest)
                 self.crashes[cell.spec.digest] = 0
         queue.retry(self.store, experiment)
+
+    @rule()
+    def purge(self):
+        gone = [experiment for experiment, marks in self.marks.items() if "deleted" in marks]
+        doomed = {cell.spec.digest for experiment in gone for cell in self.plans.pop(experiment).cells}
+        doomed -= {cell.spec.digest for plan in self.plans.values() for cell in plan.cells}
+        for experiment in gone:
+            del self.marks[experiment]
+        self.pictures = {picture for picture in self.pictures if picture[0] not in doomed}
+        self.crashes = {digest: count for digest, count in self.crashes.items() if digest not in doomed}
+        self.failed -= doomed
+        self.ended = [ended for ended in self.ended if ended[0].digest not in doomed]
+        assert trash.empty(self.store, self.artifacts, seconds=-1) == len(gone)
+        assert_sound(self.store)
 
     @precondition(lambda self: self.ended)
     @rule(pick=st.integers(0, 9), what=st.sampled_from(["finish", "fail", "release"]))
@@ -405,7 +478,7 @@ class Queue(RuleBasedStateMachine):
         assert dump(self.store) == before
         if left:
             role, k = left.pop(0)
-            record(self.store, work, role, k)
+            self._record(work, role, k)
             self.pictures.add((work.digest, role, k))
             self.crashes[work.digest] = 0
 
@@ -433,7 +506,20 @@ class Queue(RuleBasedStateMachine):
             cell = self.plans[experiment].cells[position]
             assert (digest, role, replicates) == (cell.spec.digest, cell.role, cell.replicates)
             assert had == sum((digest, role, k) in self.pictures for k in range(replicates))
-            assert is_open == (self.live[experiment] and had < replicates and digest not in self.failed)
+            assert is_open == (not self.marks[experiment] and had < replicates and digest not in self.failed)
+
+    @invariant()
+    def everybody_sees_a_cell_by_what_is_theirs(self):
+        rows = select(
+            self.store,
+            "select experiment_id, digest, had = replicates, cell.state, standing.state from standing "
+            "join cell on cell.id = cell_id",
+        )
+        for experiment, digest, complete, state, shown in rows:
+            marks = self.marks[experiment]
+            why = "paused" if "paused" in marks else "cancelled"
+            live = "failed" if digest in self.failed else state if not marks else why
+            assert shown == ("done" if complete else live), (experiment, digest, marks)
 
     @invariant()
     def queued_means_wanted_and_idle_means_not(self):
@@ -455,7 +541,7 @@ class Queue(RuleBasedStateMachine):
     def _wanted(self, experiment):
         """(experiment, planned cell) of what live experiments miss, in the order of claiming."""
         for live, plan in sorted(self.plans.items()):
-            if self.live[live] and experiment in (None, live):
+            if not self.marks[live] and experiment in (None, live):
                 yield from ((live, cell) for cell in plan.cells if self._open(cell))
 
     def _open(self, cell):
@@ -469,6 +555,26 @@ class Queue(RuleBasedStateMachine):
 
     def _state(self, digest):
         return select(self.store, "select state from cell where digest = ?", digest)[0][0]
+
+    def _record(self, work, role, k):
+        return record(self.store, work, role, k)
+
+    def _experiment(self, pick):
+        return sorted(self.plans)[pick % len(self.plans)]
+
+    def _stop(self, experiment, stop, marks):
+        """Under new marks nothing of it is wanted; what was drawn for it alone is to be killed."""
+        wanted = {cell.spec.digest for _, cell in self._wanted(experiment)}
+        self.marks[experiment] = marks
+        killed = set(stop(self.store, experiment))
+        alone = {
+            attempt: work
+            for attempt, (work, _) in self.claimed.items()
+            if work.digest in wanted and not self._is_wanted(work.digest)
+        }
+        assert killed == {work.cell_id for work in alone.values()}
+        for attempt in alone:
+            self._end(attempt)
 
     def _pick(self, pick):
         return next(itertools.islice(self.claimed.values(), pick % len(self.claimed), None))
