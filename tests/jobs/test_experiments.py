@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 
-from jobs import experiments, plan, queue
-from jobs.errors import DataDirectoryProblem, NotFound
+from jobs import experiments, plan, queue, trash
+from jobs.errors import DataDirectoryProblem, KeyReused, NotFound, WasDeleted
 from jobs.store import Store
 from tests.jobs.conftest import claim, dump, planned, record, select, submit, work_off
 from tests.jobs.grids import parse, tables
@@ -94,6 +94,46 @@ def test_a_cancelled_experiment_is_wanted_again_when_it_is_submitted_again(store
     assert submit(store).id == experiment.id
     assert not experiments.find(store, "1").cancelled
     assert work_off(store)[0].missing == (("cell", 1),)
+
+
+def test_the_same_key_is_the_same_request(store, data):
+    """Whatever happened since the first time: the second one changes nothing at all."""
+    asked, other = planned(), planned(spp=[9])
+    first, new = experiments.submit(store, asked, data / "scenes", "key")
+    assert new == 3
+    queue.cancel(store, first.id)
+    before = dump(store)
+    again, new = experiments.submit(store, asked, data / "scenes", "key")
+    assert (again.id, again.cancelled, new) == (first.id, True, 0)
+    with pytest.raises(KeyReused, match="the Idempotency-Key 'key' came with another grid before; send a new key"):
+        experiments.submit(store, other, data / "scenes", "key")
+    assert dump(store) == before
+    assert not experiments.submit(store, asked, data / "scenes", "another key")[0].cancelled
+
+
+def test_a_key_of_what_was_deleted_brings_nothing_back(store, artifacts, data):
+    first, _ = experiments.submit(store, planned(), data / "scenes", "key")
+    queue.delete(store, first.id)
+    before = dump(store)
+    with pytest.raises(WasDeleted):
+        experiments.submit(store, planned(), data / "scenes", "key")
+    assert dump(store) == before
+    trash.empty(store, artifacts, seconds=-1)
+    assert experiments.submit(store, planned(), data / "scenes", "key")[0].id > first.id
+
+
+def test_a_request_that_fails_leaves_no_key(store, data, monkeypatch):
+    def die(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(queue, "want", die)
+        with pytest.raises(KeyboardInterrupt):
+            experiments.submit(store, planned(), data / "scenes", "key")
+    assert (
+        select(store, "select count(*) from experiment") == select(store, "select count(*) from submission") == [(0,)]
+    )
+    assert experiments.submit(store, planned(spp=[9]), data / "scenes", "key")[1] == 2
 
 
 def test_submitting_again_does_not_retry_what_failed(store):
