@@ -18,6 +18,10 @@ from pathlib import Path
 
 import pytest
 
+from jobs import grid as grids
+from renderer.errors import DartboardError
+from service.remote import submit_grid
+
 ROOT = Path(__file__).resolve().parent.parent.parent
 GRID = """
 name = "small"
@@ -29,7 +33,7 @@ resolution = [24, 16]
 reference = { spp = 64 }
 """
 PICTURES = 2 * 2 * 2 + 2
-LONG = GRID.replace("[4, 16]", "[4, 16, 400, 401, 402, 403]").replace("[24, 16]", "[64, 64]")
+LONG = GRID.replace("[4, 16]", "[4, 16, 400, 401]").replace("[24, 16]", "[64, 64]")
 
 
 MANY = list(range(1, 1001))
@@ -274,22 +278,21 @@ def test_a_cancelled_experiment_ends_the_waiting(server: Server, long: Path) -> 
     assert f"`dartboard retry 1 --server {server.url}` goes on" in err
 
 
-@pytest.mark.parametrize("where", ["server", "data"])
-def test_pause_and_resume(server: Server, long: Path, where: str) -> None:
-    """With the server's address, or with the data directory that it owns."""
-    place = ("--server", server.url) if where == "server" else ("--data", server.data)
+def test_pause_and_resume(server: Server, long: Path) -> None:
+    """With the server's address, or with the data directory that it owns: either way the server does it."""
+    there, beside = ("--server", server.url), ("--data", server.data)
     with start("submit", long, "--server", server.url, "--wait") as waiting:
         wait_for(waiting, r"^ +\d+/\d+ ")
-        assert "'small' is paused; " in dartboard("pause", "small", *place).stdout
+        assert "'small' is paused; " in dartboard("pause", "small", *there).stdout
         wait_for(waiting, "paused: `dartboard resume 1 ")
         assert experiment(server)["state"] == "paused"
-        assert "pictures of 'small' are queued" in dartboard("resume", "1", *place).stdout
+        assert "pictures of 'small' are queued" in dartboard("resume", "1", *beside).stdout
         wait_for(waiting, r"^ +\d+/\d+ ")
         waiting.send_signal(signal.SIGINT)
         waiting.communicate(timeout=10)
-    assert "'small' is cancelled; " in dartboard("cancel", "small", *place).stdout
-    assert "'small' is cancelled; " in dartboard("resume", "small", *place).stdout
-    assert "pictures of 'small' are queued" in dartboard("retry", "small", *place).stdout
+    assert "'small' is cancelled; " in dartboard("cancel", "small", *beside).stdout
+    assert "'small' is cancelled; " in dartboard("resume", "small", *there).stdout  # it was not paused
+    assert "pictures of 'small' are queued" in dartboard("retry", "small", *beside).stdout
 
 
 # -- reading --
@@ -362,18 +365,20 @@ def test_commands_without_a_server_load_no_http(done: Server, tmp_path: Path, wo
 def test_a_bad_grid_is_refused_in_the_words_of_check(done: Server, tmp_path: Path, content: str) -> None:
     (tmp_path / "grid.toml").write_text(content)
     (tmp_path / "plugin.xml").write_text('<scene version="3.0.0"><bsdf type="no_such_plugin"/></scene>')
-    checked = dartboard("check", tmp_path / "grid.toml")
-    submitted = dartboard("submit", tmp_path / "grid.toml", "--server", done.url)
-    assert (submitted.returncode, submitted.stdout) == (2, "")
-    assert submitted.stderr == checked.stderr
+    with pytest.raises(DartboardError) as known:
+        grids.read(tmp_path / "grid.toml")
+    with pytest.raises(DartboardError) as told:
+        submit_grid(tmp_path / "grid.toml", done.url, wait=False, as_json=False)
+    assert str(told.value) == str(known.value)
+    assert told.value.exit_code == known.value.exit_code == 2
 
 
-def test_grids_that_cannot_be_read_are_refused_in_the_words_of_check(done: Server, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["none.toml", "latin.toml", "."])
+def test_a_grid_that_cannot_be_read_is_refused_in_the_words_of_check(done: Server, tmp_path: Path, name: str) -> None:
     (tmp_path / "latin.toml").write_bytes(b'name = "\xe9"\nscenes = ["cornell_box"]')
-    for name in ("none.toml", "latin.toml", "."):
-        submitted = dartboard("submit", tmp_path / name, "--server", done.url)
-        assert submitted.returncode == 2
-        assert submitted.stderr == dartboard("check", tmp_path / name).stderr != ""
+    submitted = dartboard("submit", tmp_path / name, "--server", done.url)
+    assert (submitted.returncode, submitted.stdout) == (2, "")
+    assert submitted.stderr == dartboard("check", tmp_path / name).stderr != ""
 
 
 def test_unknown_experiments_are_told_with_those_that_are_there(done: Server) -> None:
@@ -384,20 +389,14 @@ def test_unknown_experiments_are_told_with_those_that_are_there(done: Server) ->
         assert "Traceback" not in told.stderr
 
 
-def test_servers_that_are_not_there(done: Server, tmp_path: Path) -> None:
-    (tmp_path / "grid.toml").write_text(GRID)
+@pytest.mark.parametrize("words", [("status",), ("submit", "GRID")])
+def test_a_server_that_is_not_there(grid: Path, words: tuple[str, ...]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         free = f"http://127.0.0.1:{taken.getsockname()[1]}"
-    for words in (("status",), ("cancel", "small"), ("submit", tmp_path / "grid.toml"), ("results", "small")):
-        told = dartboard(*words, "--server", free)
-        assert (told.returncode, told.stdout) == (3, "")
-        assert told.stderr.startswith(f"dartboard: no server answers at {free} (Connection refused); start one with")
-        assert told.stderr.count("\n") == 1
-    for words, said in ((("--server", "ftp://x"), "no address"), (("--server", "x", "--data", "y"), "two places")):
-        told = dartboard("status", *words)
-        assert told.returncode == 2 and said in told.stderr
-    told = dartboard("submit", tmp_path / "grid.toml")
-    assert told.returncode == 2 and "which server?" in told.stderr
+    told = dartboard(*(grid if word == "GRID" else word for word in words), "--server", free)
+    assert (told.returncode, told.stdout) == (3, "")
+    assert told.stderr.startswith(f"dartboard: no server answers at {free} (Connection refused); start one with")
+    assert told.stderr.count("\n") == 1
 
 
 def test_a_port_in_use_and_a_data_directory_in_use(done: Server, tmp_path: Path) -> None:

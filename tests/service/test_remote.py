@@ -5,15 +5,18 @@ errors. The events are made here; real ones flow in tests/e2e/test_server_cli.py
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from renderer.errors import BadParameter
 from service.client import Away, Back, Client
 from service.following import Watcher, measured
 from service.progress import Bars
 from service.remote import points
 from service.schemas import Cell, Experiment, ExperimentDetail, Progress, Update, Worker
+from service.settings import place, server_address
 
 URL = "http://127.0.0.1:8000"
 EXPERIMENT = Experiment(
@@ -79,6 +82,26 @@ def test_passes_of_cells_that_were_never_named_are_no_error(watcher: Watcher) ->
     """Progress may come before the cell itself, after a connection was lost."""
     watcher.hear(Progress(cell=99, role="reference", replicate=1, done=1, passes=4, seconds=0.1, preview=0))
     assert watcher.bars.one.tasks[0].description == "reference 2 · pass 1/4"
+
+
+def test_where_an_experiment_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line counts more than the environment, there the server more than the data directory."""
+    monkeypatch.delenv("DARTBOARD_SERVER", raising=False)
+    monkeypatch.setenv("DARTBOARD_DATA", "elsewhere")
+    assert place(None, None) == Path("elsewhere")
+    assert place(None, URL) == URL
+    monkeypatch.setenv("DARTBOARD_SERVER", URL)
+    assert place(None, None) == server_address(None) == URL
+    assert place(Path("here"), None) == Path("here")
+    assert server_address("other:80") == "other:80"
+
+
+def test_two_places_or_none_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("DARTBOARD_SERVER", raising=False)
+    with pytest.raises(BadParameter, match="--data here and --server http://x are two places; give one of them"):
+        place(Path("here"), "http://x")
+    with pytest.raises(BadParameter, match="which server?"):
+        server_address(None)
 
 
 class Pages(Client):
