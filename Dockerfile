@@ -28,7 +28,7 @@ VOLUME /data
 EXPOSE 8000
 
 # Without the proxy that an environment may name; an answer that is no success is an error.
-HEALTHCHECK --interval=30s --timeout=10s --start-period=60s --start-interval=2s \
+HEALTHCHECK --interval=15s --timeout=10s --start-period=60s \
   CMD ["python", "-c", "from urllib.request import ProxyHandler, build_opener; build_opener(ProxyHandler({})).open('http://127.0.0.1:8000/api/health', timeout=5)"]
 
 # Off loopback the service demands a token (DARTBOARD_TOKEN), so a container without one does not start.
