@@ -61,7 +61,8 @@ export function address() {
 
 /**
  * Sets several values of the query at once; null or "" takes one out, a list repeats the name.
- * @param {Record<string, string | readonly string[] | null>} values @param {{push?: boolean}} [options] push: back undoes it
+ * @param {Record<string, string | readonly string[] | null>} values
+ * @param {{push?: boolean}} [options] push: back undoes it
  */
 export function setParams(values, { push = false } = {}) {
   if (push) write();
@@ -94,14 +95,15 @@ export function useParam(name, fallback) {
   return [params.get(name) ?? fallback, set];
 }
 
-/** Makes plain links to views stay in the page. Downloads, the API, new tabs and other hosts are left to the browser. */
+/** Makes links to views stay in the page; downloads, the API, new tabs and other hosts are left to the browser. */
 export function captureLinks() {
   document.addEventListener("click", (event) => {
-    if (event.defaultPrevented || event.button || event.metaKey || event.ctrlKey || event.shiftKey || event.altKey) return;
+    const modified = event.metaKey || event.ctrlKey || event.shiftKey || event.altKey;
+    if (event.defaultPrevented || event.button || modified) return;
     const link = event.target instanceof Element ? event.target.closest("a") : null;
     if (!(link instanceof HTMLAnchorElement) || link.target || link.hasAttribute("download")) return;
     const url = new URL(link.href, here);
-    if (url.origin !== here.origin || /^\/(api|static)\//.test(url.pathname) || url.pathname === "/openapi.json") return;
+    if (url.origin !== here.origin || /^\/(api\/|static\/|openapi\.json$)/.test(url.pathname)) return;
     if (url.hash && url.pathname === here.pathname) return;
     event.preventDefault();
     navigate(url.pathname + url.search + url.hash);

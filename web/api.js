@@ -137,9 +137,15 @@ export const experiments = {
   get: (id) => getJson(at(id)),
   /** @param {Submission} submission @param {AbortSignal} [signal] @returns {Promise<DryRun>} */
   dryRun: (submission, signal) => postJson("/api/experiments?dry_run=true", submission, {}, { signal }),
-  /** The same `key` never makes two experiments. @param {Submission} submission @param {string} key @returns {Promise<Experiment>} */
+  /**
+   * The same `key` never makes two experiments.
+   * @param {Submission} submission @param {string} key @returns {Promise<Experiment>}
+   */
   submit: (submission, key) => postJson("/api/experiments", submission, { "Idempotency-Key": key }),
-  /** @param {number} id @param {"pause" | "resume" | "cancel" | "retry" | "restore"} action @returns {Promise<Experiment>} */
+  /**
+   * @param {number} id @param {"pause" | "resume" | "cancel" | "retry" | "restore"} action
+   * @returns {Promise<Experiment>}
+   */
   act: (id, action) => postJson(`${at(id)}/${action}`),
   /** @param {number} id @param {{dryRun?: boolean}} [options] @returns {Promise<Deleted>} */
   remove: (id, { dryRun = false } = {}) => del(at(id) + (dryRun ? "?dry_run=true" : "")),
@@ -160,7 +166,10 @@ export const experiments = {
 export const scenes = {
   /** @returns {Promise<Scene[]>} */
   list: () => getJson("/api/scenes"),
-  /** @param {Blob} zip a scene's folder @param {string} name @param {string} [main] its XML file @returns {Promise<Scene>} */
+  /**
+   * @param {Blob} zip a scene's folder @param {string} name @param {string} [main] its XML file
+   * @returns {Promise<Scene>}
+   */
   upload: (zip, name, main) => postBytes(`/api/scenes${query({ name, main })}`, zip, "application/zip"),
 };
 
@@ -174,7 +183,8 @@ export const cells = {
 /**
  * A tone-mapped PNG; `v` only makes URLs of a changing picture distinct.
  * @param {number} cell
- * @param {{role?: Role, k?: number, size?: 64 | 128 | 256 | 512, ev?: number, tone?: string, max?: number, v?: string | number}} [how]
+ * @param {{role?: Role, k?: number, size?: 64 | 128 | 256 | 512, ev?: number, tone?: string, max?: number,
+ *   v?: string | number}} [how]
  */
 export function previewUrl(cell, how = {}) {
   return `/api/cells/${cell}/preview.png${query(how)}`;
@@ -189,7 +199,10 @@ export function errorUrl(cell, metric, how) {
   return `/api/cells/${cell}/error/${encodeURIComponent(metric)}.png${query(how)}`;
 }
 
-/** Float16 RGB rows, see `X-Width`. @param {number} cell @param {{role?: Role, k?: number | "mean", size?: number}} [which] */
+/**
+ * Float16 RGB rows, see `X-Width`.
+ * @param {number} cell @param {{role?: Role, k?: number | "mean", size?: number}} [which]
+ */
 export function pixelsUrl(cell, which = {}) {
   return `/api/cells/${cell}/pixels${query(which)}`;
 }

@@ -37,7 +37,10 @@ function App() {
     <${Toasts}><${Lost} status=${live.status} /><//>`;
 }
 
-/** The view, under the one place where a bug in it ends. Another address starts afresh. @param {{path: string}} props */
+/**
+ * The view, under the one place where a bug in it ends. Another address starts afresh.
+ * @param {{path: string}} props
+ */
 function Main({ path }) {
   const element = useRef(/** @type {HTMLElement | null} */ (null));
   const first = useRef(true);
@@ -46,7 +49,9 @@ function Main({ path }) {
     if (!first.current) element.current?.focus({ preventScroll: true });
     first.current = false;
   }, [path]);
-  return html`<main id="content" tabindex="-1" ref=${element}><${Boundary} key=${path}><${View} path=${path} /><//></main>`;
+  return html`<main id="content" tabindex="-1" ref=${element}>
+    <${Boundary} key=${path}><${View} path=${path} /><//>
+  </main>`;
 }
 
 /** @param {{children?: Child}} props */
@@ -81,7 +86,10 @@ function ExperimentPage({ id }) {
   return view ? html`<${view.Experiment} id=${id} />` : html`<${Loading} />`;
 }
 
-/** Over the page, not above it: nothing moves when it comes and goes. @param {{status: import("./events.js").Status}} props */
+/**
+ * Over the page, not above it: nothing moves when it comes and goes.
+ * @param {{status: import("./events.js").Status}} props
+ */
 function Lost({ status }) {
   return status === "down" && html`<p class="lost"><span class="pulse"></span>The server is gone; trying again…</p>`;
 }

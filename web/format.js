@@ -10,14 +10,15 @@
 export function number(value, digits = 3) {
   if (value === null || value === undefined || Number.isNaN(value)) return "–";
   if (!Number.isFinite(value)) return value > 0 ? "∞" : "-∞";
+  if (value === 0) return "0";
   const size = Math.abs(value);
-  if (size !== 0 && (size < 0.1 || size >= 10 ** (digits + 1))) return value.toExponential(digits - 1);
+  if (size < 0.1 || size >= 10 ** (digits + 1)) return value.toExponential(digits - 1);
   return value.toPrecision(digits);
 }
 
 /** A share: 0.314 → "31 %". @param {number | null | undefined} share */
 export function percent(share, digits = 0) {
-  return share === null || share === undefined || !Number.isFinite(share) ? "–" : `${(share * 100).toFixed(digits)} %`;
+  return Number.isFinite(share) ? `${(Number(share) * 100).toFixed(digits)} %` : "–";
 }
 
 /** A whole number with thin spaces between thousands. @param {number | null | undefined} value */
@@ -30,7 +31,10 @@ export function counted(value, one, many = `${one}s`) {
   return `${count(value)}\u00a0${value === 1 ? one : many}`;
 }
 
-/** The two units that matter: "850 ms", "12 s", "3 min 20 s", "2 h 5 min", "3 d 4 h". @param {number | null | undefined} seconds */
+/**
+ * The two units that matter: "850 ms", "12 s", "3 min 20 s", "2 h 5 min", "3 d 4 h".
+ * @param {number | null | undefined} seconds
+ */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";
   if (seconds < 0.0005) return "0 s";

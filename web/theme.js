@@ -44,7 +44,10 @@ export function setTheme(next) {
   apply();
 }
 
-/** The choice, what it comes to, and how to change it; redraws on a change. @returns {{choice: Choice, dark: boolean, set: (next: Choice) => void}} */
+/**
+ * The choice, what it comes to, and how to change it; redraws on a change.
+ * @returns {{choice: Choice, dark: boolean, set: (next: Choice) => void}}
+ */
 export function useTheme() {
   const [, redraw] = useState(0);
   useEffect(() => {

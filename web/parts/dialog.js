@@ -26,7 +26,8 @@ export function Dialog({ title, onClose, wide = false, children }) {
   const click = (event) => {
     if (event.target === element.current) onClose();
   };
-  return html`<dialog ref=${element} class=${wide ? "wide" : ""} aria-label=${title} onCancel=${cancel} onMouseDown=${click}>
+  const kind = wide ? "wide" : "";
+  return html`<dialog ref=${element} class=${kind} aria-label=${title} onCancel=${cancel} onMouseDown=${click}>
     <div class="dialog-body">
       <h2>${title}</h2>
       ${children}

@@ -22,11 +22,15 @@ export function Header({ path, worker, status, onHelp }) {
     </a>
     <nav aria-label="Pages">
       <a href="/" aria-current=${path === "/" ? "page" : null}>Experiments</a>
-      <a href="/new" aria-current=${path === "/new" ? "page" : null}><span>New<span class="wide-only"> experiment</span></span></a>
+      <a href="/new" aria-current=${path === "/new" ? "page" : null}>
+        <span>New<span class="wide-only"> experiment</span></span>
+      </a>
     </nav>
     <${Working} worker=${worker} status=${status} />
     <${ThemeButton} />
-    <button class="button quiet icon" aria-label="Keyboard shortcuts" title="Keyboard shortcuts (?)" onClick=${onHelp}>?</button>
+    <button class="button quiet icon" aria-label="Keyboard shortcuts" title="Keyboard shortcuts (?)" onClick=${onHelp}>
+      ?
+    </button>
   </header>`;
 }
 
@@ -42,14 +46,16 @@ function Working({ worker, status }) {
     stalled: `stalled: ${trouble ?? "no reason given"}`,
   }[state];
   const waiting = queued > 0 && html`<span class="working-queue number">${count(queued)} queued</span>`;
+  const link = state === "rendering" && experiment !== null;
   const text = html`<span class="name">${what}</span>`;
   const title = state === "rendering" ? `Rendering on ${worker.device}: ${what}` : what;
   return html`<p class="working" data-worker=${state} title=${title} role=${state === "stalled" ? "alert" : null}>
-    ${experiment !== null && state === "rendering" ? html`<a href=${`/experiments/${experiment}`}>${text}</a>` : text} ${waiting}
+    ${link ? html`<a href=${`/experiments/${experiment}`}>${text}</a>` : text} ${waiting}
   </p>`;
 }
 
-/** @type {Record<import("../theme.js").Choice, {next: import("../theme.js").Choice, icon: import("./icons.js").IconName, says: string}>} */
+/** @typedef {import("../theme.js").Choice} Choice */
+/** @type {Record<Choice, {next: Choice, icon: import("./icons.js").IconName, says: string}>} */
 const THEMES = {
   auto: { next: "dark", icon: "auto", says: "as the system" },
   dark: { next: "light", icon: "moon", says: "dark" },

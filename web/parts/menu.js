@@ -23,8 +23,8 @@ export function Menu({ label, actions }) {
     items()[0]?.focus();
     /** @param {Event} event */
     const elsewhere = (event) => {
-      const inside = [list, button].some(({ current }) => event.target instanceof Node && current?.contains(event.target));
-      if (!inside) hide();
+      const target = /** @type {Node} */ (event.target);
+      if (![list, button].some(({ current }) => current?.contains(target))) hide();
     };
     addEventListener("scroll", place, { passive: true });
     addEventListener("pointerdown", elsewhere);

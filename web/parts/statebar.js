@@ -27,7 +27,7 @@ export function StateBar({ experiment }) {
   const words = parts.map(([state, number]) => `${count(number)} ${state}`).join(", ");
   return html`<div class="statebar" role="img" aria-label=${`${counted(total, "cell")}: ${words}`}>
     <div class="statebar-track">
-      ${parts.map(([state, number]) => html`<span key=${state} data-state=${state} style=${{ flexGrow: number }}></span>`)}
+      ${parts.map(([state, flexGrow]) => html`<span key=${state} data-state=${state} style=${{ flexGrow }}></span>`)}
     </div>
     <div class="statebar-legend" aria-hidden="true">
       ${parts.map(

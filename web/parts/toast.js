@@ -34,7 +34,10 @@ export function toast(note) {
   setTimeout(() => dismiss(id), SHOWN_MS);
 }
 
-/** Runs what the user asked for and says what went wrong with it. @template T @param {Promise<T>} work @returns {Promise<T | undefined>} */
+/**
+ * Runs what the user asked for and says what went wrong with it.
+ * @template T @param {Promise<T>} work @returns {Promise<T | undefined>}
+ */
 export async function told(work) {
   try {
     return await work;
@@ -49,7 +52,10 @@ function dismiss(id) {
   put(notes.filter((note) => note.id !== id));
 }
 
-/** Notes, and above them what else the whole page has to say. @param {{children?: import("../vendor/preact-htm.js").Child}} props */
+/**
+ * Notes, and above them what else the whole page has to say.
+ * @param {{children?: import("../vendor/preact-htm.js").Child}} props
+ */
 export function Toasts({ children }) {
   const [, redraw] = useState(0);
   useEffect(() => {
@@ -73,7 +79,9 @@ export function Toasts({ children }) {
           >
             ${action.label}
           </button>`}
-          <button class="button quiet icon" aria-label="Dismiss" onClick=${() => dismiss(id)}><${Icon} name="close" /></button>
+          <button class="button quiet icon" aria-label="Dismiss" onClick=${() => dismiss(id)}>
+            <${Icon} name="close" />
+          </button>
         </div>`,
     )}
   </div>`;

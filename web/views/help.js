@@ -27,14 +27,21 @@ export function Help({ onClose }) {
   const groups = registered().map(({ title, shortcuts }) => ({ title, shortcuts }));
   if (!groups.some(({ title }) => title === VIEWER)) groups.push({ title: VIEWER, shortcuts: VIEWER_KEYS });
   return html`<${Dialog} title="Keyboard shortcuts" onClose=${onClose} wide>
-    <button class="button quiet icon dialog-close" aria-label="Close" onClick=${onClose}><${Icon} name="close" /></button>
+    <button class="button quiet icon dialog-close" aria-label="Close" onClick=${onClose}>
+      <${Icon} name="close" />
+    </button>
     <div class="shortcuts">
       ${groups.map(
         ({ title, shortcuts }) => html`<section key=${title}>
           <h3>${title}</h3>
           ${title === VIEWER && html`<p class="hint">These act while a picture has the focus.</p>`}
           <dl>
-            ${shortcuts.map((shortcut) => html`<div key=${shortcut.does}><dt>${written(shortcut)}</dt><dd>${shortcut.does}</dd></div>`)}
+            ${shortcuts.map(
+              (shortcut) => html`<div key=${shortcut.does}>
+                <dt>${written(shortcut)}</dt>
+                <dd>${shortcut.does}</dd>
+              </div>`,
+            )}
           </dl>
         </section>`,
       )}

@@ -4,7 +4,7 @@
  * is in the address.
  */
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/preact-htm.js";
-import { overviewEvents, Unreachable } from "../api.js";
+import { overviewEvents } from "../api.js";
 import { navigate, useParam } from "../address.js";
 import { follow } from "../events.js";
 import { counted } from "../format.js";
@@ -13,10 +13,12 @@ import { Icon } from "../parts/icons.js";
 import { STATES } from "../parts/statebar.js";
 import { DeleteDialog } from "./list/delete.js";
 import { Row } from "./list/row.js";
-import { Failure, Loading, Message } from "./states.js";
+import { Loading, Message, ServerGone } from "./states.js";
 
 /** @typedef {import("../api.js").Experiment} Experiment */
 /** @typedef {import("../api.js").State} State */
+
+const COLUMNS = ["Name", "State", "Cells", "Pictures", "Time left", "Created"];
 
 export function List() {
   const { experiments, status } = useOverview();
@@ -27,7 +29,7 @@ export function List() {
   useKeys("Experiments", [{ keys: "/", does: "filter by name", run: () => search.current?.focus() }]);
   const shown = useMemo(() => filtered(experiments ?? [], text, state), [experiments, text, state]);
 
-  if (!experiments) return status === "down" ? html`<${Failure} error=${new Unreachable()} />` : html`<${Placeholder} />`;
+  if (!experiments) return status === "down" ? html`<${ServerGone} />` : html`<${Placeholder} />`;
   if (!experiments.length) return html`<${Empty} />`;
   return html`<div class="page list">
     <div class="list-head">
@@ -50,11 +52,10 @@ export function List() {
     ${shown.length > 0
       ? html`<div class="rows panel" role="table" aria-label="Experiments">
           <div class="rows-head" role="row">
-            ${["Name", "State", "Cells", "Pictures", "Time left", "Created", ""].map(
-              (title) => html`<span role="columnheader" key=${title}>${title || html`<span class="unseen">Actions</span>`}</span>`,
-            )}
+            ${COLUMNS.map((title) => html`<span role="columnheader" key=${title}>${title}</span>`)}
+            <span role="columnheader"><span class="unseen">Actions</span></span>
           </div>
-          ${shown.map((experiment) => html`<${Row} key=${experiment.id} experiment=${experiment} onDelete=${setDeleting} />`)}
+          ${shown.map((one) => html`<${Row} key=${one.id} experiment=${one} onDelete=${setDeleting} />`)}
         </div>`
       : html`<${Message} title="No experiment fits the filter" mark="none">
           <p class="row"><button class="button" onClick=${() => navigate("/", { replace: true })}>Show all</button></p>
@@ -107,7 +108,12 @@ function StateFilter({ experiments, state, onState }) {
   const present = STATES.filter((one) => one === state || experiments.some((experiment) => experiment.state === one));
   return html`<div class="list-states" role="group" aria-label="Filter by state">
     ${present.map(
-      (one) => html`<button key=${one} class="chip" aria-pressed=${one === state} onClick=${() => onState(one === state ? null : one)}>
+      (one) => html`<button
+        key=${one}
+        class="chip"
+        aria-pressed=${one === state}
+        onClick=${() => onState(one === state ? null : one)}
+      >
         <span class="state" data-state=${one}>${one}</span>
         <span class="number muted">${experiments.filter((experiment) => experiment.state === one).length}</span>
       </button>`,
@@ -119,7 +125,9 @@ function Placeholder() {
   return html`<div class="page list">
     <div class="list-head"><h1>Experiments</h1></div>
     <${Loading}>
-      <div class="panel rows">${[0, 1, 2, 3, 4].map((row) => html`<div class="rows-blank" key=${row}><div class="skeleton"></div></div>`)}</div>
+      <div class="panel rows">
+        ${[0, 1, 2, 3, 4].map((row) => html`<div class="rows-blank" key=${row}><div class="skeleton"></div></div>`)}
+      </div>
     <//>
   </div>`;
 }

@@ -28,6 +28,12 @@ import { Failure, Loading } from "./states.js";
 /** @typedef {import("./new/catalog.js").Catalog} Catalog */
 /** @typedef {import("./new/form.js").Form} Form */
 
+const HINTS = {
+  samplers: "where random numbers come from",
+  integrators: "how light is followed",
+  spp: "each is a point of every curve",
+  reference: "what errors are measured against",
+};
 const LINKABLE = 6000; // characters of a grid that an address may carry
 
 export function New() {
@@ -70,16 +76,17 @@ function Editor({ catalog, scenes }) {
   const form = fromQuery(params);
   const typing = tab === "toml";
   const text = params.get("toml") ?? long;
-  const uploaded = Object.fromEntries(known.filter(({ builtin }) => !builtin).map(({ name, digest }) => [name, digest]));
-  const submission = typing ? (text.trim() ? { toml: text, origin: "grid.toml", scenes: uploaded } : null) : toSubmission(form);
+  const submission = typing ? textSubmission(text, known) : toSubmission(form);
   const estimate = useDryRun(submission);
   const [formText, setFormText] = useState(/** @type {string | null} */ (null));
   useEffect(() => {
     if (!typing && estimate.result && !estimate.stale && !estimate.faults.length) setFormText(estimate.result.toml);
   }, [typing, estimate.result, estimate.stale]);
 
-  /** @param {Partial<Form>} change */
-  const change = (change) => setParams(toQuery({ ...form, ...change }));
+  /** @param {Partial<Form>} next */
+  const change = (next) => setParams(toQuery({ ...form, ...next }));
+  /** @param {Scene} scene */
+  const onUploaded = (scene) => setKnown([...known.filter(({ digest }) => digest !== scene.digest), scene]);
   /** @param {string} next */
   const write = (next) => {
     const linkable = next.length <= LINKABLE;
@@ -92,9 +99,8 @@ function Editor({ catalog, scenes }) {
     setTab(next);
   };
 
-  const ready = submission !== null && estimate.result !== null && !estimate.stale && !estimate.faults.length && !sending;
   async function submit() {
-    if (!ready || !submission) return;
+    if (!submission || !estimate.result || estimate.stale || estimate.faults.length || sending) return;
     setSending(true);
     const content = JSON.stringify(submission);
     if (key.current.of !== content) key.current = { of: content, key: random() }; // sent again, it is the same request
@@ -117,18 +123,27 @@ function Editor({ catalog, scenes }) {
     <div class="new-head">
       <h1>New experiment</h1>
       <div class="tabs" role="group" aria-label="Edit as">
-        ${[["form", "Form"], ["toml", "TOML"]].map(
-          ([value, title]) => html`<button key=${value} class="chip" aria-pressed=${tab === value} onClick=${() => turn(value ?? "form")}>${title}</button>`,
-        )}
+        <button class="chip" aria-pressed=${!typing} onClick=${() => turn("form")}>Form</button>
+        <button class="chip" aria-pressed=${typing} onClick=${() => turn("toml")}>TOML</button>
       </div>
     </div>
     <div class="new-body">
       ${typing
         ? html`<${GridEditor} text=${text} onText=${write} fromForm=${formText} linkable=${text.length <= LINKABLE} />`
-        : html`<${FormFields} ...${{ form, change, catalog, known, faults: estimate.faults }} onUploaded=${(/** @type {Scene} */ scene) => setKnown([...known.filter(({ digest }) => digest !== scene.digest), scene])} />`}
+        : html`<${FormFields} ...${{ form, change, catalog, known, faults: estimate.faults, onUploaded }} />`}
       <${Panel} estimate=${estimate} beside=${!typing} sending=${sending} onSubmit=${submit} />
     </div>
   </div>`;
+}
+
+/**
+ * A grid as text, with every uploaded scene that it may name; null without any text.
+ * @param {string} text @param {readonly Scene[]} known @returns {Submission | null}
+ */
+function textSubmission(text, known) {
+  const own = known.filter(({ builtin }) => !builtin);
+  const uploads = Object.fromEntries(own.map(({ name, digest }) => [name, digest]));
+  return text.trim() ? { toml: text, origin: "grid.toml", scenes: uploads } : null;
 }
 
 /**
@@ -136,36 +151,53 @@ function Editor({ catalog, scenes }) {
  *   faults: readonly Fault[], onUploaded: (scene: Scene) => void}} props
  */
 function FormFields({ form, change, catalog, known, faults, onUploaded }) {
-  /** @param {number} number */
-  const chosen = (number) => html`<span class="hint number">${number} chosen</span>`;
+  /** @type {(key: keyof Form) => (value: unknown) => void} */
+  const set = (key) => (value) => change({ [key]: value });
+  /** @param {readonly unknown[]} values */
+  const chosen = (values) => html`<span class="hint number">${values.length} chosen</span>`;
+  const { name, scenes, samplers, integrators, spp, reference } = form;
   return html`<div class="new-form">
     <section class="form-section panel">
       <${TextField}
-        label="Name" field="name" wide value=${form.name} faults=${faults} placeholder=${suggestedName(form)}
-        onInput=${(/** @type {string} */ name) => change({ name })}
+        label="Name"
+        field="name"
+        wide
+        value=${name}
+        faults=${faults}
+        placeholder=${suggestedName(form)}
+        onInput=${set("name")}
       />
     </section>
-    <${Section} id="scenes" title="Scenes" hint="what is rendered" faults=${faults} aside=${chosen(form.scenes.length)}>
+    <${Section} id="scenes" title="Scenes" hint="what is rendered" faults=${faults} aside=${chosen(scenes)}>
       <${Scenes}
-        entries=${catalog.scenes} known=${known} chosen=${form.scenes} onUploaded=${onUploaded}
-        onChange=${(/** @type {Form["scenes"]} */ next) => change({ scenes: next })}
+        entries=${catalog.scenes}
+        known=${known}
+        chosen=${scenes}
+        onUploaded=${onUploaded}
+        onChange=${set("scenes")}
       />
     <//>
-    <${Section} id="samplers" title="Samplers" hint="where random numbers come from" faults=${faults} aside=${chosen(form.samplers.length)}>
-      <${Plugins} entries=${catalog.samplers} chosen=${form.samplers} onChange=${(/** @type {Form["samplers"]} */ samplers) => change({ samplers })} />
+    <${Section} id="samplers" title="Samplers" hint=${HINTS.samplers} faults=${faults} aside=${chosen(samplers)}>
+      <${Plugins} entries=${catalog.samplers} chosen=${samplers} onChange=${set("samplers")} />
     <//>
-    <${Section} id="integrators" title="Integrators" hint="how light is followed" faults=${faults} aside=${chosen(form.integrators.length)}>
-      <${Plugins} entries=${catalog.integrators} chosen=${form.integrators} onChange=${(/** @type {Form["integrators"]} */ integrators) => change({ integrators })} />
+    <${Section}
+      id="integrators"
+      title="Integrators"
+      hint=${HINTS.integrators}
+      faults=${faults}
+      aside=${chosen(integrators)}
+    >
+      <${Plugins} entries=${catalog.integrators} chosen=${integrators} onChange=${set("integrators")} />
     <//>
-    <${Section} id="spp" title="Samples per pixel" hint="each is a point of every curve" faults=${faults} aside=${chosen(form.spp.length)}>
-      <${Spp} spp=${form.spp} onChange=${(/** @type {readonly string[]} */ spp) => change({ spp })} />
+    <${Section} id="spp" title="Samples per pixel" hint=${HINTS.spp} faults=${faults} aside=${chosen(spp)}>
+      <${Spp} spp=${spp} onChange=${set("spp")} />
     <//>
     <section class="form-section panel" aria-label="Pictures">
       <div class="form-title"><h2>Pictures</h2></div>
       <${Pictures} form=${form} change=${change} catalog=${catalog} faults=${faults} />
     </section>
-    <${Section} id="reference" title="Reference" hint="what errors are measured against" faults=${faults}>
-      <${ReferenceFields} reference=${form.reference} catalog=${catalog} onChange=${(/** @type {Form["reference"]} */ reference) => change({ reference })} />
+    <${Section} id="reference" title="Reference" hint=${HINTS.reference} faults=${faults}>
+      <${ReferenceFields} reference=${reference} catalog=${catalog} onChange=${set("reference")} />
     <//>
   </div>`;
 }
@@ -175,7 +207,11 @@ function Placeholder() {
     <div class="new-head"><h1>New experiment</h1></div>
     <${Loading}>
       <div class="new-body">
-        <div class="new-form">${[76, 320, 240].map((height) => html`<div class="skeleton" key=${height} style=${{ height: `${height}px` }}></div>`)}</div>
+        <div class="new-form">
+          <div class="skeleton" style="height: 88px"></div>
+          <div class="skeleton" style="height: 360px"></div>
+          <div class="skeleton" style="height: 240px"></div>
+        </div>
         <div class="skeleton" style="height: 320px"></div>
       </div>
     <//>

@@ -25,13 +25,18 @@ export function Message({ title, mark = "miss", children }) {
 /** The dartboard: hit in the middle, missed, or not yet thrown at. @param {{kind: string}} props */
 function Mark({ kind }) {
   return html`<svg class="mark" width="72" height="72" viewBox="0 0 72 72" aria-hidden="true">
-    ${[30, 20, 10].map((r) => html`<circle cx="36" cy="36" r=${r} fill="none" stroke="var(--line)" stroke-width="4" />`)}
+    <g fill="none" stroke="var(--line)" stroke-width="4">
+      ${[30, 20, 10].map((r) => html`<circle key=${r} cx="36" cy="36" r=${r} />`)}
+    </g>
     ${kind === "miss" && html`<circle cx="59" cy="12" r="5" fill="var(--bad)" />`}
     ${kind === "hit" && html`<circle cx="36" cy="36" r="5" fill="var(--accent)" />`}
   </svg>`;
 }
 
-/** Shows `children` (a placeholder of the right size) once loading takes longer than a blink. @param {{children?: Child}} props */
+/**
+ * Shows `children` (a placeholder of the right size) once loading takes longer than a blink.
+ * @param {{children?: Child}} props
+ */
 export function Loading({ children }) {
   const [late, setLate] = useState(false);
   useEffect(() => {
@@ -71,7 +76,9 @@ function Refused({ error, onRetry }) {
   const others = (problems ?? []).map(({ detail }) => detail).filter((detail) => detail !== error.message);
   return html`<${Message} title=${sentence(title)}>
     <p>${error.message}</p>
-    ${others.length > 0 && html`<ul class="faults">${others.map((detail) => html`<li key=${detail}>${detail}</li>`)}</ul>`}
+    <ul class="faults">
+      ${others.map((detail) => html`<li key=${detail}>${detail}</li>`)}
+    </ul>
     <p class="row">
       <a class="button primary" href="/">All experiments</a>
       ${onRetry && status !== 404 && html`<button class="button" onClick=${onRetry}>Try again</button>`}
@@ -89,8 +96,9 @@ export function DeletedExperiment({ id, name, detail, onRestored }) {
     if (onRestored) onRestored();
     else navigate(`/experiments/${id}`, { replace: true });
   };
+  const what = html`<strong class="name">${name ?? `Experiment ${id}`}</strong>`;
   return html`<${Message} title="This experiment was deleted">
-    <p>${detail ?? html`<strong class="name">${name ?? `Experiment ${id}`}</strong> is in the bin; its pictures are still here for a while.`}</p>
+    <p>${detail ?? html`${what} is in the bin; its pictures are still here for a while.`}</p>
     <p class="row">
       <button class="button primary" onClick=${undo}>Undo the deletion</button>
       <a class="button" href="/">All experiments</a>
@@ -116,13 +124,14 @@ export function ServerGone({ onRetry }) {
 /** A bug of ours: honest about it, with what a report of it needs. @param {{error: unknown}} props */
 export function Crashed({ error }) {
   const trace = error instanceof Error ? (error.stack ?? error.message) : String(error);
+  const copy = () => told(navigator.clipboard.writeText(`${location.href}\n${trace}`));
   return html`<${Message} title="This page broke">
     <p>That is a bug of the dashboard. The experiments go on undisturbed, and nothing of them is lost.</p>
     <pre class="trace">${trace}</pre>
     <p class="row">
       <button class="button primary" onClick=${() => location.reload()}>Load the page again</button>
       <a class="button" href="/">All experiments</a>
-      <button class="button" onClick=${() => told(navigator.clipboard.writeText(`${location.href}\n${trace}`))}>Copy the report</button>
+      <button class="button" onClick=${copy}>Copy the report</button>
     </p>
   <//>`;
 }

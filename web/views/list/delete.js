@@ -28,7 +28,10 @@ export function DeleteDialog({ experiment, onClose, onDeleted }) {
 
   return html`<${Dialog} title="Delete this experiment?" onClose=${onClose}>
     <p class="dialog-name">${name}</p>
-    <div class="dialog-facts">${error ? html`<p class="fault">${error}</p>` : takes ? html`<${Takes} takes=${takes} />` : html`<p class="muted">Counting…</p>`}</div>
+    <div class="dialog-facts">
+      ${error && html`<p class="fault">${error}</p>`} ${takes && html`<${Takes} takes=${takes} />`}
+      ${!error && !takes && html`<p class="muted">Counting…</p>`}
+    </div>
     <div class="dialog-buttons">
       <button class="button" autofocus onClick=${onClose}>Keep it</button>
       <button class="button danger" disabled=${!takes} onClick=${remove}>Delete</button>
@@ -38,9 +41,10 @@ export function DeleteDialog({ experiment, onClose, onDeleted }) {
 
 /** @param {{takes: Deleted}} props */
 function Takes({ takes: { cells, pictures, disk_bytes, final_at } }) {
+  const lost = `${counted(pictures, "picture")} in ${counted(cells, "cell")}`;
   return html`<p>
       ${pictures > 0
-        ? html`${counted(pictures, "picture")} in ${counted(cells, "cell")} that no other experiment wants, ${bytes(disk_bytes)}, would go with it.`
+        ? `${lost} that no other experiment wants would go with it, and free ${bytes(disk_bytes)}.`
         : "No picture would go with it: other experiments want all of them, or there are none yet."}
     </p>
     <p class="muted">It can be undone until <time datetime=${final_at} title=${final_at}>${when(final_at)}</time>.</p>`;

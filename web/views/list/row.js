@@ -37,11 +37,18 @@ export class Row extends Component {
         <span>${count(had)}<span class="muted"> of ${count(wanted)}</span></span>
         ${failed > 0 && html`<span class="fault">${counted(failed, "cell")} failed</span>`}
       </span>
-      <span class="rows-left number" role="cell">${seconds_left === null ? html`<span class="muted">–</span>` : duration(seconds_left)}</span>
-      <time class="rows-created number muted" role="cell" datetime=${created_at} title=${created_at}>${when(created_at)}</time>
+      <span class="rows-left number" role="cell">${duration(seconds_left)}</span>
+      <span class="rows-created number muted" role="cell">
+        <time datetime=${created_at} title=${created_at}>${when(created_at)}</time>
+      </span>
       <span class="rows-actions" role="cell">
         ${quick &&
-        html`<button class="button quiet icon" title=${quick.label} aria-label=${`${quick.label}: ${name}`} onClick=${quick.run}>
+        html`<button
+          class="button quiet icon"
+          title=${quick.label}
+          aria-label=${`${quick.label}: ${name}`}
+          onClick=${quick.run}
+        >
           <${Icon} name=${quick.icon} />
         </button>`}
         <${Menu} label="Actions" actions=${actions} />
@@ -56,7 +63,10 @@ function contents({ cells, references }) {
   return counted(own ?? 0, "cell") + (others ? ` + ${counted(others, "reference")}` : "");
 }
 
-/** What can be done in this state. @param {Experiment} experiment @param {(experiment: Experiment) => void} onDelete @returns {Action[]} */
+/**
+ * What can be done in this state.
+ * @param {Experiment} experiment @param {(experiment: Experiment) => void} onDelete @returns {Action[]}
+ */
 function actionsFor(experiment, onDelete) {
   const { id, state, failed } = experiment;
   /** @type {(action: "pause" | "resume" | "cancel" | "retry") => () => void} */

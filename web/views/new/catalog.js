@@ -54,6 +54,7 @@ export function entryOf(entries, type) {
 /** The range of a parameter in words. @param {Parameter} parameter */
 export function allowed({ type, minimum, maximum, unit }) {
   if (type === "bool" || type === "str") return "";
-  const range = maximum !== null ? `${minimum ?? "any"} to ${maximum}` : minimum !== null ? `${minimum} or more` : "any number";
-  return range + (unit ? ` ${unit}` : "");
+  const words = unit && ` ${unit}`;
+  if (maximum !== null) return `${minimum ?? "any"} to ${maximum}${words}`;
+  return minimum === null ? `any number${words && ` of${words}`}` : `${minimum}${words} or more`;
 }

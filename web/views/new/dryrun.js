@@ -10,13 +10,14 @@ import { ApiProblem, experiments, Unreachable } from "../../api.js";
 /** @typedef {import("../../api.js").Fault} Fault */
 /** @typedef {import("../../api.js").Submission} Submission */
 /** @typedef {{result: DryRun | null, faults: readonly Fault[], stale: boolean}} Estimate */
+/** To the submission `of`. @typedef {{of: string, result: DryRun | null, faults: readonly Fault[]}} Answer */
 
 const PAUSE_MS = 300;
 const RETRY_MS = 2000;
 
 /** @param {Submission | null} submission null: nothing to ask yet @returns {Estimate} */
 export function useDryRun(submission) {
-  const [answer, setAnswer] = useState({ of: "", result: /** @type {DryRun | null} */ (null), faults: /** @type {readonly Fault[]} */ ([]) });
+  const [answer, setAnswer] = useState(/** @type {Answer} */ ({ of: "", result: null, faults: [] }));
   const asked = JSON.stringify(submission);
   useEffect(() => {
     if (!submission) return undefined;
@@ -39,6 +40,7 @@ export function useDryRun(submission) {
       clearTimeout(timer);
     };
   }, [asked]);
+  if (!submission) return { result: null, faults: [], stale: false };
   return { result: answer.result, faults: answer.faults, stale: answer.of !== asked };
 }
 

@@ -7,7 +7,29 @@ import { html } from "../../vendor/preact-htm.js";
 
 /** What in the form shows a fault of which key of a grid. @type {Record<string, string>} */
 const SHOWN_AT = { scene: "scenes", crop: "scenes" };
-const FIELDS = ["name", "scenes", "samplers", "integrators", "spp", "replicates", "resolution", "max_depth", "rfilter", "colour", "reference"];
+
+/** The keys of a grid that the form has a field for. */
+export const FIELDS = [
+  "name",
+  "scenes",
+  "samplers",
+  "integrators",
+  "spp",
+  "replicates",
+  "resolution",
+  "max_depth",
+  "rfilter",
+  "colour",
+  "reference",
+];
+
+/**
+ * A handler that passes on what was typed or chosen.
+ * @param {(text: string) => void} set @returns {(event: {currentTarget: {value: string}}) => void}
+ */
+export function onText(set) {
+  return (event) => set(event.currentTarget.value);
+}
 
 /** The field of the form that shows a fault, null for none. @param {Fault} fault */
 export function placeOf({ field }) {
@@ -24,13 +46,14 @@ export function Faults({ of: field, faults }) {
   </div>`;
 }
 
-/** @param {{id: string, title: string, hint?: Child, faults: readonly Fault[], aside?: Child, children?: Child}} props */
+/**
+ * @param {{id: string, title: string, hint?: Child, faults: readonly Fault[], aside?: Child, children?: Child}} props
+ */
 export function Section({ id, title, hint, faults, aside, children }) {
   return html`<section class="form-section panel" id=${id} aria-labelledby=${`${id}-title`}>
     <div class="form-title">
       <h2 id=${`${id}-title`}>${title}</h2>
-      ${hint && html`<p class="hint">${hint}</p>`}
-      <span class="spacer"></span>
+      <p class="hint">${hint}</p>
       ${aside}
     </div>
     ${children}
@@ -43,7 +66,7 @@ export function Section({ id, title, hint, faults, aside, children }) {
  * @param {{label: string, value: string, onInput: (value: string) => void, field?: string, faults?: readonly Fault[],
  *   placeholder?: string, hint?: Child, numeric?: boolean, wide?: boolean}} props
  */
-export function TextField({ label, value, onInput, field, faults = [], placeholder, hint, numeric = false, wide = false }) {
+export function TextField({ label, value, onInput, field, faults = [], placeholder, hint, numeric, wide }) {
   const wrong = field !== undefined && faults.some((fault) => placeOf(fault) === field);
   return html`<div class="field">
     <label>
@@ -57,7 +80,7 @@ export function TextField({ label, value, onInput, field, faults = [], placehold
         placeholder=${placeholder}
         aria-invalid=${wrong}
         aria-describedby=${field ? `fault-${field}` : null}
-        onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => onInput(event.currentTarget.value)}
+        onInput=${onText(onInput)}
       />
     </label>
     ${hint && html`<p class="hint">${hint}</p>`} ${field && html`<${Faults} of=${field} faults=${faults} />`}
@@ -72,8 +95,8 @@ export function SelectField({ label, value, options, onChange }) {
   return html`<div class="field">
     <label>
       <span class="label">${label}</span>
-      <select value=${value} onChange=${(/** @type {{currentTarget: HTMLSelectElement}} */ event) => onChange(event.currentTarget.value)}>
-        ${known.map((option) => html`<option key=${option} value=${option} selected=${option === value}>${option}</option>`)}
+      <select value=${value} onChange=${onText(onChange)}>
+        ${known.map((one) => html`<option key=${one} value=${one} selected=${one === value}>${one}</option>`)}
       </select>
     </label>
   </div>`;

@@ -71,7 +71,10 @@ function scene(text) {
   return name === undefined ? { name: text } : { name, digest };
 }
 
-/** Every field of the form as a list of texts, by its name in the query. @param {Form} form @returns {Record<string, readonly string[]>} */
+/**
+ * Every field of the form as a list of texts, by its name in the query.
+ * @param {Form} form @returns {Record<string, readonly string[]>}
+ */
 function fields(form) {
   const { wanted, integrator, sampler, spp } = form.reference;
   return {
@@ -167,12 +170,15 @@ function uploads(scenes) {
   return Object.fromEntries(scenes.flatMap(({ name, digest }) => (digest ? [[name, digest]] : [])));
 }
 
+const MAX_NAME = 120; // characters that a list still shows whole
+
 /** A name that says what is compared, for who gives none. @param {Form} form */
 export function suggestedName({ samplers, integrators, scenes }) {
   const axis = samplers.length > 1 || integrators.length <= 1 ? samplers : integrators;
   const compared = list(axis.map(label)) || "Nothing";
-  const name = `${compared} on ${list(scenes.map(({ name: one }) => one)) || "no scene"}`;
-  return name.length <= 120 ? name : `${axis.length} ${axis === samplers ? "samplers" : "integrators"} on ${scenes.length} scenes`;
+  const name = `${compared} on ${list(scenes.map((scene) => scene.name)) || "no scene"}`;
+  if (name.length <= MAX_NAME) return name;
+  return `${axis.length} ${axis === samplers ? "samplers" : "integrators"} on ${scenes.length} scenes`;
 }
 
 /** "a, b and c". @param {readonly string[]} words */

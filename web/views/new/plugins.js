@@ -6,6 +6,7 @@
 import { html } from "../../vendor/preact-htm.js";
 import { Icon } from "../../parts/icons.js";
 import { allowed, entryOf } from "./catalog.js";
+import { onText } from "./fields.js";
 import { label } from "./form.js";
 
 /** @typedef {import("./catalog.js").Entry} Entry */
@@ -58,7 +59,9 @@ function Plugin({ entry, entries, chosen, onChange }) {
           onRemove=${variants.length > 1 ? () => onChange(chosen.filter((one) => one !== variant)) : undefined}
         />`,
       )}
-      <button class="button quiet small" type="button" onClick=${another}><${Icon} name="plus" /> Compare with other parameters</button>
+      <button class="button quiet small" type="button" onClick=${another}>
+        <${Icon} name="plus" /> Compare with other parameters
+      </button>
     </div>`}
   </li>`;
 }
@@ -73,7 +76,10 @@ function inserted(entries, chosen, one) {
   return later < 0 ? [...chosen, one] : [...chosen.slice(0, later), one, ...chosen.slice(later)];
 }
 
-/** Another one like `one`: a switch is turned, since two alike would be one. @param {Entry} entry @param {Choice} one @returns {Choice} */
+/**
+ * Another one like `one`: a switch is turned, since two alike would be one.
+ * @param {Entry} entry @param {Choice} one @returns {Choice}
+ */
 function varied(entry, one) {
   const first = entry.parameters[0];
   if (first?.type !== "bool") return { ...one };
@@ -82,12 +88,21 @@ function varied(entry, one) {
   return { ...one, parameters: next === String(first.default) ? others : { ...others, [first.name]: next } };
 }
 
-/** @param {{entry: Entry, variant: Choice, first: boolean, onChange: (next: Choice) => void, onRemove?: () => void}} props */
+/**
+ * @param {{entry: Entry, variant: Choice, first: boolean, onChange: (next: Choice) => void,
+ *   onRemove?: () => void}} props
+ */
 function Variant({ entry, variant, first, onChange, onRemove }) {
   return html`<div class="variant" role="group" aria-label=${label(variant)}>
     <${Parameters} entry=${entry} choice=${variant} onChange=${onChange} explained=${first} />
     ${onRemove &&
-    html`<button class="button quiet icon variant-remove" type="button" title="Remove this variant" aria-label=${`Remove ${label(variant)}`} onClick=${onRemove}>
+    html`<button
+      class="button quiet icon variant-remove"
+      type="button"
+      title="Remove this variant"
+      aria-label=${`Remove ${label(variant)}`}
+      onClick=${onRemove}
+    >
       <${Icon} name="close" />
     </button>`}
   </div>`;
@@ -116,7 +131,7 @@ export function Parameters({ entry, choice, onChange, explained = true }) {
           html`<input
             type="checkbox"
             checked=${(text || usual) === "true"}
-            onChange=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => set(name, String(event.currentTarget.checked))}
+            onChange=${() => set(name, String((text || usual) !== "true"))}
           />`}
           <code>${name}</code>
           ${type !== "bool" &&
@@ -126,7 +141,7 @@ export function Parameters({ entry, choice, onChange, explained = true }) {
             autocomplete="off"
             placeholder=${usual}
             value=${text}
-            onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => set(name, event.currentTarget.value.trim())}
+            onInput=${onText((typed) => set(name, typed.trim()))}
           />`}
         </span>
         ${explained && html`<span class="hint">${line}</span>`}

@@ -3,18 +3,21 @@
  * An experiment as the beginning of another: its grid in the form, or as text where the form has no field for it.
  */
 import { choice } from "./form.js";
+import { FIELDS } from "./fields.js";
 import { readToml } from "./toml.js";
 
 /** @typedef {import("./form.js").Form} Form */
 /** @typedef {import("../../api.js").ExperimentDetail} ExperimentDetail */
 
-const KNOWN = ["name", "scenes", "samplers", "integrators", "spp", "replicates", "resolution", "max_depth", "rfilter", "colour", "reference"];
 const COPY = / \(copy(?: (\d+))?\)$/;
 
-/** The form of an experiment's grid, null where the form cannot say all of it. @param {ExperimentDetail} experiment @returns {Form | null} */
+/**
+ * The form of an experiment's grid, null where the form cannot say all of it.
+ * @param {ExperimentDetail} experiment @returns {Form | null}
+ */
 export function formOf({ toml, paths = {} }) {
   const grid = readToml(toml);
-  if (!grid || Object.keys(grid).some((key) => !KNOWN.includes(key))) return null;
+  if (!grid || Object.keys(grid).some((key) => !FIELDS.includes(key))) return null;
   const reference = grid.reference;
   if (isTable(reference) && "replicates" in reference && reference.replicates !== 2) return null;
   const [width, height] = texts(grid.resolution);
@@ -32,7 +35,12 @@ export function formOf({ toml, paths = {} }) {
     depth: String(grid.max_depth ?? ""),
     rfilter: choice(String(grid.rfilter ?? "box")),
     colour: String(grid.colour ?? "rgb"),
-    reference: { wanted: reference !== false, integrator: said("integrator"), sampler: said("sampler"), spp: said("spp") },
+    reference: {
+      wanted: reference !== false,
+      integrator: said("integrator"),
+      sampler: said("sampler"),
+      spp: said("spp"),
+    },
   };
 }
 

@@ -5,7 +5,9 @@ import { scenes as api } from "../../api.js";
 import { bytes, counted } from "../../format.js";
 import { Icon } from "../../parts/icons.js";
 import { faultsOf } from "./dryrun.js";
+import { onText } from "./fields.js";
 
+/** @typedef {import("../../vendor/preact-htm.js").Child} Child */
 /** @typedef {import("../../api.js").Scene} Scene */
 /** @typedef {import("./catalog.js").SceneEntry} SceneEntry */
 /** @typedef {import("./form.js").SceneChoice} SceneChoice */
@@ -23,9 +25,8 @@ export function Scenes({ entries, known, chosen, onChange, onUploaded }) {
     const on = chosen.some((one) => same(one, scene));
     return { on, onToggle: () => onChange(on ? chosen.filter((one) => !same(one, scene)) : [...chosen, scene]) };
   };
-  const elsewhere = chosen.filter(
-    (one) => !entries.some(({ name }) => same(one, { name })) && !own.some(({ name, digest }) => same(one, { name, digest })),
-  );
+  const here = [...entries.map(({ name }) => ({ name })), ...own.map(({ name, digest }) => ({ name, digest }))];
+  const elsewhere = chosen.filter((one) => !here.some((other) => same(one, other)));
   return html`<ul class="scenes">
       ${entries.map((entry) => {
         const file = known.find(({ name, builtin }) => builtin && name === entry.name);
@@ -49,7 +50,9 @@ export function Scenes({ entries, known, chosen, onChange, onUploaded }) {
     />`;
 }
 
-/** @param {{title: string, name?: string, on: boolean, onToggle: () => void, children?: import("../../vendor/preact-htm.js").Child}} props */
+/**
+ * @param {{title: string, name?: string, on: boolean, onToggle: () => void, children?: Child}} props
+ */
 function Card({ title, name, on, onToggle, children }) {
   return html`<li class=${`scene ${on ? "on" : ""}`}>
     <label class="scene-head">
@@ -94,7 +97,8 @@ function Own({ scene, on, onToggle }) {
 
 /** @param {Scene} scene */
 function size({ width, height, max_depth }) {
-  return `${width} × ${height} pixels, ${max_depth < 0 ? "unlimited paths" : `paths of ${counted(max_depth, "edge")}`}`;
+  const paths = max_depth < 0 ? "paths of any length" : `paths of ${counted(max_depth, "edge")}`;
+  return `${width} × ${height} pixels, ${paths}`;
 }
 
 /** @param {{onUploaded: (scene: Scene) => void}} props */
@@ -130,7 +134,8 @@ function Upload({ onUploaded }) {
     event.preventDefault();
     setOver(true);
   };
-  return html`<div class=${`upload ${over ? "over" : ""}`} onDrop=${drop} onDragOver=${drag} onDragLeave=${() => setOver(false)}>
+  const leave = () => setOver(false);
+  return html`<div class=${`upload ${over ? "over" : ""}`} onDrop=${drop} onDragOver=${drag} onDragLeave=${leave}>
     <input
       ref=${input}
       class="unseen"
@@ -147,8 +152,10 @@ function Upload({ onUploaded }) {
     <span class="spacer"></span>
     <label class="parameter-line hint" title="Only where the folder has several XML files">
       <span>main file</span>
-      <input type="text" placeholder="scene.xml" value=${main} onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => setMain(event.currentTarget.value)} />
+      <input type="text" placeholder="scene.xml" value=${main} onInput=${onText(setMain)} />
     </label>
-    ${faults.length > 0 && html`<div class="upload-faults" role="alert">${faults.map((fault) => html`<p class="fault" key=${fault}>${fault}</p>`)}</div>`}
+    <div class="upload-faults" role="alert">
+      ${faults.map((fault) => html`<p class="fault" key=${fault}>${fault}</p>`)}
+    </div>
   </div>`;
 }

@@ -25,12 +25,15 @@ export function GridEditor({ text, onText, fromForm, linkable }) {
     <div class="form-title">
       <h2>The grid</h2>
       <p class="hint">The same text as for <code>./dartboard run grid.toml</code></p>
-      <span class="spacer"></span>
-      <input ref=${input} class="unseen" type="file" tabindex="-1" aria-hidden="true" accept=".toml,text/plain" onChange=${open} />
-      <button class="button" type="button" onClick=${() => input.current?.click()}><${Icon} name="upload" /> Open a file…</button>
+      <input ref=${input} class="unseen" type="file" tabindex="-1" aria-hidden="true" accept=".toml" onChange=${open} />
+      <button class="button" type="button" onClick=${() => input.current?.click()}>
+        <${Icon} name="upload" /> Open a file…
+      </button>
       ${fromForm !== null &&
       fromForm !== text &&
-      html`<button class="button" type="button" title="Replaces this text" onClick=${() => onText(fromForm)}>Fill in from the form</button>`}
+      html`<button class="button" type="button" title="Replaces this text" onClick=${() => onText(fromForm)}>
+        Fill in from the form
+      </button>`}
     </div>
     <textarea
       class="editor"
@@ -39,11 +42,10 @@ export function GridEditor({ text, onText, fromForm, linkable }) {
       aria-label="Grid as TOML"
       placeholder=${'scenes = ["cornell_box"]\nsamplers = ["independent", "stratified"]\nspp = [4, 16, 64]'}
       value=${text}
-      onInput=${(/** @type {{currentTarget: HTMLTextAreaElement}} */ event) => onText(event.currentTarget.value)}
+      onInput=${(/** @type {{currentTarget: {value: string}}} */ event) => onText(event.currentTarget.value)}
       onDrop=${drop}
     ></textarea>
-    <p class="hint">
-      Scenes by name: built in, or uploaded in the form. ${!linkable && "This text is too long for a link; it is lost when the page is left."}
-    </p>
+    <p class="hint">Scenes by name: built in, or uploaded in the form.</p>
+    ${!linkable && html`<p class="hint">This text is too long for a link; it is lost when the page is left.</p>`}
   </section>`;
 }

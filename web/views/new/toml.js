@@ -39,7 +39,7 @@ class Reader {
   /** @param {string} [wanted] */
   take(wanted) {
     const token = this.tokens[this.at++];
-    if (token === undefined || (wanted !== undefined && token !== wanted)) throw new SyntaxError(`${wanted} is missing`);
+    if (token === undefined || token !== (wanted ?? token)) throw new SyntaxError(`${wanted} is missing`);
     return token;
   }
 

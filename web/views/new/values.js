@@ -3,16 +3,17 @@
 import { html, useState } from "../../vendor/preact-htm.js";
 import { Icon } from "../../parts/icons.js";
 import { entryOf } from "./catalog.js";
-import { Faults, SelectField, TextField } from "./fields.js";
+import { Faults, onText, SelectField, TextField } from "./fields.js";
 import { Parameters } from "./plugins.js";
 
 /** @typedef {import("../../api.js").Fault} Fault */
 /** @typedef {import("./catalog.js").Catalog} Catalog */
 /** @typedef {import("./form.js").Form} Form */
+/** @typedef {import("./form.js").Reference} Reference */
 /** @typedef {(change: Partial<Form>) => void} Change */
 
 const POWERS = Array.from({ length: 13 }, (_, power) => String(2 ** power)); // 1 to 4096
-/** Ladders that give a slope: enough points, evenly apart on a logarithmic axis. @type {readonly [string, readonly string[]][]} */
+/** Enough points for a slope, evenly apart on a logarithmic axis. @type {readonly [string, readonly string[]][]} */
 const LADDERS = [
   ["4, 16, 64, 256", ["4", "16", "64", "256"]],
   ["4, 8, 16 … 256", ["4", "8", "16", "32", "64", "128", "256"]],
@@ -22,9 +23,9 @@ const SIZES = ["64", "128", "256", "512"];
 /** @param {{spp: readonly string[], onChange: (spp: readonly string[]) => void}} props */
 export function Spp({ spp, onChange }) {
   const [text, setText] = useState("");
-  const all = sorted([...new Set([...POWERS, ...spp])]);
+  const all = sorted([...POWERS, ...spp]);
   /** @param {readonly string[]} values */
-  const set = (values) => onChange(sorted([...new Set(values)]));
+  const set = (values) => onChange(sorted(values));
   /** @param {Event} event */
   const add = (event) => {
     event.preventDefault();
@@ -53,86 +54,141 @@ export function Spp({ spp, onChange }) {
         aria-label="Other samples per pixel"
         placeholder="other: 9, 25"
         value=${text}
-        onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => setText(event.currentTarget.value)}
+        onInput=${onText(setText)}
         onBlur=${add}
       />
       <button class="button"><${Icon} name="plus" /> Add</button>
       <span class="spacer"></span>
       <span class="hint">or all of</span>
-      ${LADDERS.map(([title, values]) => html`<button key=${title} class="button quiet number" type="button" onClick=${() => set(values)}>${title}</button>`)}
+      ${LADDERS.map(
+        ([title, values]) =>
+          html`<button key=${title} type="button" class="button quiet" onClick=${() => set(values)}>${title}</button>`,
+      )}
     </form>`;
 }
 
-/** By number; what is no number comes last. @param {readonly string[]} texts */
+/** Each once, by number; what is no number comes last. @param {readonly string[]} texts */
 function sorted(texts) {
   /** @param {string} text */
-  const order = (text) => (Number.isFinite(Number(text)) ? Number(text) : Infinity);
-  return [...texts].sort((one, other) => order(one) - order(other) || 0);
+  const order = (text) => (Number.isFinite(Number(text)) ? Number(text) : Number.MAX_VALUE);
+  return [...new Set(texts)].sort((one, other) => order(one) - order(other));
 }
 
 /** @param {{form: Form, change: Change, catalog: Catalog, faults: readonly Fault[]}} props */
 export function Pictures({ form, change, catalog, faults }) {
   const { replicates, width, height, depth, rfilter, colour } = form;
   const filter = entryOf(catalog.rfilters, rfilter.type);
+  /** @type {(key: keyof Form) => (text: string) => void} */
+  const set = (key) => (text) => change({ [key]: text.replace("−", "-") });
+  /** @param {string} side */
+  const square = (side) => change({ width: side, height: side });
   return html`<div class="fields">
-      <${TextField}
-        label="Replicates" field="replicates" numeric value=${replicates} faults=${faults} placeholder="4"
-        hint="pictures of each cell with other seeds; their spread is the error bar"
-        onInput=${(/** @type {string} */ text) => change({ replicates: text })}
+    <${TextField}
+      label="Replicates"
+      field="replicates"
+      numeric
+      value=${replicates}
+      faults=${faults}
+      placeholder="4"
+      hint="pictures of each cell with other seeds; their spread is the error bar"
+      onInput=${set("replicates")}
+    />
+    <div class="field">
+      <span class="label">Resolution</span>
+      <div class="size">
+        <${Side} label="Width in pixels" placeholder="width" value=${width} onInput=${set("width")} />
+        <span class="muted">×</span>
+        <${Side} label="Height in pixels" placeholder="height" value=${height} onInput=${set("height")} />
+      </div>
+      <div class="row">
+        ${SIZES.map(
+          (side) =>
+            html`<button key=${side} type="button" class="link" onClick=${() => square(side)}>${side}²</button>`,
+        )}
+        <button type="button" class="link" onClick=${() => square("")}>as the scene</button>
+      </div>
+      <${Faults} of="resolution" faults=${faults} />
+    </div>
+    <${TextField}
+      label="Longest path"
+      field="max_depth"
+      numeric
+      value=${depth}
+      faults=${faults}
+      placeholder="as the scene"
+      hint="edges; -1 is unlimited"
+      onInput=${set("depth")}
+    />
+    <div class="field">
+      <${SelectField}
+        label="Filter"
+        value=${rfilter.type}
+        options=${names(catalog.rfilters)}
+        onChange=${(/** @type {string} */ type) => change({ rfilter: { type, parameters: {} } })}
       />
-      <div class="field">
-        <span class="label">Resolution</span>
-        <div class="size">
-          <input
-            type="text" class="tiny" inputmode="numeric" aria-label="Width in pixels" placeholder="width" value=${width}
-            onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => change({ width: event.currentTarget.value })}
-          />
-          <span class="muted">×</span>
-          <input
-            type="text" class="tiny" inputmode="numeric" aria-label="Height in pixels" placeholder="height" value=${height}
-            onInput=${(/** @type {{currentTarget: HTMLInputElement}} */ event) => change({ height: event.currentTarget.value })}
-          />
-        </div>
-        <div class="row sizes">
-          ${SIZES.map((side) => html`<button key=${side} type="button" class="link" onClick=${() => change({ width: side, height: side })}>${side}²</button>`)}
-          <button type="button" class="link" onClick=${() => change({ width: "", height: "" })}>as the scene</button>
-        </div>
-        <${Faults} of="resolution" faults=${faults} />
-      </div>
-      <${TextField}
-        label="Longest path" field="max_depth" numeric value=${depth} faults=${faults} placeholder="as the scene"
-        hint="edges; −1 is unlimited" onInput=${(/** @type {string} */ text) => change({ depth: text.replace("−", "-") })}
-      />
-      <div class="field">
-        <${SelectField}
-          label="Filter" value=${rfilter.type} options=${catalog.rfilters.map(({ name }) => name)}
-          onChange=${(/** @type {string} */ type) => change({ rfilter: { type, parameters: {} } })}
-        />
-        ${filter && html`<${Parameters} entry=${filter} choice=${rfilter} onChange=${(/** @type {Form["rfilter"]} */ next) => change({ rfilter: next })} />`}
-        <p class="hint">${filter?.line}</p>
-        <${Faults} of="rfilter" faults=${faults} />
-      </div>
-      <div class="field">
-        <${SelectField} label="Colour" value=${colour} options=${["rgb", "spectral"]} onChange=${(/** @type {string} */ next) => change({ colour: next })} />
-        <p class="hint">spectral follows wavelengths instead of three colours, and takes longer</p>
-        <${Faults} of="colour" faults=${faults} />
-      </div>
-    </div>`;
+      ${filter &&
+      html`<${Parameters}
+        entry=${filter}
+        choice=${rfilter}
+        onChange=${(/** @type {Form["rfilter"]} */ next) => change({ rfilter: next })}
+      />`}
+      <p class="hint">${filter?.line}</p>
+      <${Faults} of="rfilter" faults=${faults} />
+    </div>
+    <div class="field">
+      <${SelectField} label="Colour" value=${colour} options=${["rgb", "spectral"]} onChange=${set("colour")} />
+      <p class="hint">spectral follows wavelengths instead of three colours, and takes longer</p>
+      <${Faults} of="colour" faults=${faults} />
+    </div>
+  </div>`;
 }
 
-/** @param {{reference: Form["reference"], onChange: (next: Form["reference"]) => void, catalog: Catalog}} props */
+/** @param {{label: string, placeholder: string, value: string, onInput: (text: string) => void}} props */
+function Side({ label, placeholder, value, onInput }) {
+  return html`<input
+    type="text"
+    class="tiny"
+    inputmode="numeric"
+    autocomplete="off"
+    aria-label=${label}
+    aria-describedby="fault-resolution"
+    placeholder=${placeholder}
+    value=${value}
+    onInput=${onText(onInput)}
+  />`;
+}
+
+/** @param {{reference: Reference, onChange: (next: Reference) => void, catalog: Catalog}} props */
 export function ReferenceFields({ reference, onChange, catalog }) {
-  /** @param {Partial<Form["reference"]>} change */
-  const set = (change) => onChange({ ...reference, ...change });
+  const { wanted, spp, sampler, integrator } = reference;
+  /** @type {(key: keyof Reference) => (value: string | boolean) => void} */
+  const set = (key) => (value) => onChange({ ...reference, [key]: value });
   return html`<div class="row" role="group" aria-label="Reference">
-      <button type="button" class="chip" aria-pressed=${reference.wanted} onClick=${() => set({ wanted: true })}>render one</button>
-      <button type="button" class="chip" aria-pressed=${!reference.wanted} onClick=${() => set({ wanted: false })}>none</button>
-      ${!reference.wanted && html`<p class="hint">Without a reference there are pictures and times, but no errors and no curves.</p>`}
+      <button type="button" class="chip" aria-pressed=${wanted} onClick=${() => set("wanted")(true)}>render one</button>
+      <button type="button" class="chip" aria-pressed=${!wanted} onClick=${() => set("wanted")(false)}>none</button>
+      ${!wanted && html`<p class="hint">Without one there are pictures and times, but no errors and no curves.</p>`}
     </div>
-    ${reference.wanted &&
+    ${wanted &&
     html`<div class="fields">
-      <${TextField} label="Samples per pixel" numeric value=${reference.spp} placeholder="4096" hint="in total, in two independent halves" onInput=${(/** @type {string} */ spp) => set({ spp })} />
-      <${SelectField} label="Sampler" value=${reference.sampler} options=${catalog.samplers.map(({ name }) => name)} onChange=${(/** @type {string} */ sampler) => set({ sampler })} />
-      <${SelectField} label="Integrator" value=${reference.integrator} options=${catalog.integrators.map(({ name }) => name)} onChange=${(/** @type {string} */ integrator) => set({ integrator })} />
+      <${TextField}
+        label="Samples per pixel"
+        numeric
+        value=${spp}
+        placeholder="4096"
+        hint="in total, in two independent halves"
+        onInput=${set("spp")}
+      />
+      <${SelectField} label="Sampler" value=${sampler} options=${names(catalog.samplers)} onChange=${set("sampler")} />
+      <${SelectField}
+        label="Integrator"
+        value=${integrator}
+        options=${names(catalog.integrators)}
+        onChange=${set("integrator")}
+      />
     </div>`}`;
+}
+
+/** @param {readonly {name: string}[]} entries */
+function names(entries) {
+  return entries.map(({ name }) => name);
 }
