@@ -57,6 +57,13 @@ def own(data: Path, url: str | None = None) -> Iterator[None]:
         os.close(descriptor)
 
 
+def refuse_owned(data: Path) -> None:
+    """Raises ``DataDirectoryProblem`` if another process owns ``data`` now; says nothing about the next moment."""
+    who = peek(data)
+    if who is not None:
+        raise _in_use(data, who)
+
+
 def peek(data: Path) -> dict[str, Any] | None:
     """Who owns ``data`` now ({"pid", "url", "started"}; values may be missing for a moment), or None."""
     try:
@@ -104,7 +111,10 @@ def _refused(data: Path, error: OSError) -> DataDirectoryProblem:
         return DataDirectoryProblem(
             f"{data} is on a file system without locks ({error.strerror}); choose a --data DIR on a local disk"
         )
-    owner = peek(data) or {}
+    return _in_use(data, peek(data) or {})
+
+
+def _in_use(data: Path, owner: dict[str, Any]) -> DataDirectoryProblem:
     who = f"process {owner['pid']}" if owner.get("pid") else "another process"
     where = f" at {owner['url']}" if owner.get("url") else ""
     return DataDirectoryProblem(

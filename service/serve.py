@@ -44,6 +44,7 @@ def serve(data: Path, *, host: str, port: int, device: str, demo: bool, token: s
     logging.basicConfig(stream=sys.stderr, format="dartboard: %(message)s", level=logging.INFO)
     logging.getLogger("httpx").setLevel(logging.WARNING)
     token = security.check_token(host, token)
+    owner.refuse_owned(data)  # before the port: a second start in the same place should name the first, not its port
     with _listen(host, port) as listening:
         url = _url(host, listening.getsockname()[1])
         with owner.own(data, url):
