@@ -10,7 +10,7 @@ from fastapi import Request
 from service.problems import TooLarge
 
 GRID_BYTES = 2**24  # a grid file of 16 MiB is refused on the command line too
-SCENE_BYTES = 2**26  # of a scene as a zip
+SCENE_BYTES = 2**28  # of a scene as a zip: 256 MiB, half of what it may unpack to
 
 
 async def read(request: Request, limit: int, what: str) -> bytes:

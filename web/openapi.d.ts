@@ -439,7 +439,7 @@ export interface paths {
         put?: never;
         /**
          * Upload
-         * @description Upload a scene: a zip of its folder, at most 64 MiB. It is vetted (only plugins that ship with Mitsuba, only files
+         * @description Upload a scene: a zip of its folder, at most 256 MiB. It is vetted (only plugins that ship with Mitsuba, only files
          *     of its own folder) and kept by its digest; a submission then says `"scenes": {NAME: digest}`.
          */
         post: operations["upload_api_scenes_post"];

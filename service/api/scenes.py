@@ -39,7 +39,7 @@ async def upload(
     main: Annotated[str | None, Query(max_length=200, description="its XML file, where the folder has several")] = None,
 ) -> schemas.Scene:
     """
-    Upload a scene: a zip of its folder, at most 64 MiB. It is vetted (only plugins that ship with Mitsuba, only files
+    Upload a scene: a zip of its folder, at most 256 MiB. It is vetted (only plugins that ship with Mitsuba, only files
     of its own folder) and kept by its digest; a submission then says `"scenes": {NAME: digest}`.
     """
     with await bodies.save(request, bodies.SCENE_BYTES, f"the archive of {name!r}") as archive:

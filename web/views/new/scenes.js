@@ -148,7 +148,7 @@ function Upload({ onUploaded }) {
     <button class="button" type="button" disabled=${busy !== ""} onClick=${() => input.current?.click()}>
       <${Icon} name="upload" /> Your own scene…
     </button>
-    <p class="hint">${busy || "A zip of a Mitsuba scene's folder, at most 64 MiB; or drop it here."}</p>
+    <p class="hint">${busy || "A zip of a Mitsuba scene's folder, at most 256 MiB; or drop it here."}</p>
     <span class="spacer"></span>
     <label class="parameter-line hint" title="Only where the folder has several XML files">
       <span>main file</span>
