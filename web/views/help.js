@@ -24,15 +24,17 @@ const VIEWER_KEYS = [
 
 /** @param {{onClose: () => void}} props */
 export function Help({ onClose }) {
-  const groups = registered().map(({ title, shortcuts }) => ({ title, shortcuts }));
-  if (!groups.some(({ title }) => title === VIEWER)) groups.push({ title: VIEWER, shortcuts: VIEWER_KEYS });
+  /** @type {Map<string, readonly Shortcut[]>} */
+  const groups = new Map();
+  for (const { title, shortcuts } of registered()) groups.set(title, [...(groups.get(title) ?? []), ...shortcuts]);
+  if (!groups.has(VIEWER)) groups.set(VIEWER, VIEWER_KEYS);
   return html`<${Dialog} title="Keyboard shortcuts" onClose=${onClose} wide>
     <button class="button quiet icon dialog-close" aria-label="Close" onClick=${onClose}>
       <${Icon} name="close" />
     </button>
     <div class="shortcuts">
-      ${groups.map(
-        ({ title, shortcuts }) => html`<section key=${title}>
+      ${[...groups].map(
+        ([title, shortcuts]) => html`<section key=${title}>
           <h3>${title}</h3>
           ${title === VIEWER && html`<p class="hint">These act while a picture has the focus.</p>`}
           <dl>
