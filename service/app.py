@@ -12,9 +12,10 @@ from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Request, Response
 from fastapi.openapi.utils import get_openapi
 from fastapi.responses import FileResponse
+from starlette.exceptions import HTTPException
 from starlette.middleware.gzip import DEFAULT_EXCLUDED_CONTENT_TYPES, GZipMiddleware
 from starlette.staticfiles import StaticFiles
 
@@ -24,7 +25,7 @@ from service.api import cells, events, experiments, scenes, server
 from service.engine import Engine
 from service.hub import Hub
 from service.pictures import Cache, Pictures
-from service.problems import install
+from service.problems import install, of_http
 from service.security import Guard
 
 WEB = Path(__file__).resolve().parent.parent / "web"
@@ -71,6 +72,7 @@ def create(engine: Engine, hub: Hub, token: str | None = None) -> FastAPI:
     app.mount("/static", Assets(directory=WEB), name="static")
     for path in PAGES:
         app.get(path, include_in_schema=False)(_page)
+    app.exception_handler(404)(_unknown)
     app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=2, exclude_content_types=NOT_COMPRESSED)
     app.add_middleware(Guard, token=token)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
@@ -79,6 +81,16 @@ def create(engine: Engine, hub: Hub, token: str | None = None) -> FastAPI:
 
 def _page() -> FileResponse:
     return FileResponse(WEB / "index.html", media_type="text/html", headers={"cache-control": "no-cache"})
+
+
+async def _unknown(request: Request, error: HTTPException) -> Response:
+    """A person who mistyped an address gets the dashboard's own words; a program gets a problem document."""
+    person = request.method == "GET" and "text/html" in request.headers.get("accept", "")
+    if not person or request.url.path.startswith(("/api/", "/static/")):
+        return of_http(request, error)
+    page = _page()
+    page.status_code = 404
+    return page
 
 
 def _openapi(app: FastAPI) -> dict[str, Any]:

@@ -69,6 +69,15 @@ def of_error(request: Request, error: DartboardError) -> JSONResponse:
     return problem(request, name, title, status, str(error), faults)
 
 
+def of_http(request: Request, error: HTTPException) -> JSONResponse:
+    """The document of what the framework refuses: an unknown path, a method that a route does not have."""
+    title = HTTPStatus(error.status_code).phrase.lower()
+    name = title.replace(" ", "-")
+    answer = problem(request, name, title, error.status_code, f"{request.method} {request.url.path}: {title}")
+    answer.headers.update(error.headers or {})
+    return answer
+
+
 def field_of(sentence: str) -> str | None:
     """The key of a grid that a sentence of ``jobs/grid.py`` is about, from the place that it names."""
     named = re.search(r"\[(scene|reference)\b", sentence)
@@ -94,11 +103,7 @@ def install(app: FastAPI) -> None:
 
     @app.exception_handler(HTTPException)
     async def http(request: Request, error: HTTPException) -> JSONResponse:
-        title = HTTPStatus(error.status_code).phrase.lower()
-        name = title.replace(" ", "-")
-        answer = problem(request, name, title, error.status_code, f"{request.method} {request.url.path}: {title}")
-        answer.headers.update(error.headers or {})
-        return answer
+        return of_http(request, error)
 
     @app.exception_handler(Exception)
     async def bug(request: Request, error: Exception) -> JSONResponse:

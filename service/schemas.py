@@ -1,8 +1,8 @@
 """
 The wire: what goes over HTTP, in and out.
 
-Names here are the names in OpenAPI and, generated from it, in ``web/api.d.ts``; nothing else defines a shape. Request
-models are strict (``false`` is no 0), answers hold plain values. Times are UTC, ISO 8601.
+Names here are the names in OpenAPI and, generated from it, in ``web/openapi.d.ts``; nothing else defines a shape.
+Request models are strict (``false`` is no 0), answers hold plain values. Times are UTC, ISO 8601.
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ import stat
 import tempfile
 import zipfile
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import IO
 
@@ -67,10 +68,26 @@ def find(store: Store, artifacts: Artifacts, uploaded: dict[str, str], name: str
             raise SceneError(
                 f"scene {shown(name)}: there is no uploaded scene {shown(uploaded[name])}; upload it again"
             )
-        return sources.kept(name, artifacts.scene_folder(row["digest"]), row["main"])
+        return replace(_kept(artifacts.scene_folder(row["digest"]), row["main"]), name=name)
     if name in BUILTIN:
         return sources.find(name, Path())
     raise UnknownName("scene", name, "", [*BUILTIN, *uploaded])
+
+
+def everything(store: Store, artifacts: Artifacts) -> list[SceneSource]:
+    """The scenes that clients have brought, newest first, under the names that they came with."""
+    found = []
+    for row in store.rows("uploaded_scenes"):
+        folder = artifacts.scene_folder(row["digest"])
+        if folder.is_dir():
+            found.append(replace(_kept(folder, row["main"]), name=row["name"]))
+    return found
+
+
+@lru_cache(maxsize=256)
+def _kept(folder: Path, main: str) -> SceneSource:
+    """A snapshot, read once: it is never changed, and reading it takes a hash of every file."""
+    return sources.kept(main, folder, main)
 
 
 def _check_name(name: str) -> None:

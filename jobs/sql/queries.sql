@@ -18,6 +18,9 @@ select id, digest from scene;
 -- name: scene_by_digest
 select * from scene where digest = :digest;
 
+-- name: uploaded_scenes
+select digest, name, main from scene where builtin = 0 order by id desc;
+
 -- name: experiment_by_digest
 select id, deleted_at from experiment where digest = :digest;
 
@@ -399,6 +402,17 @@ select id, started_at, ended_at, machine, device, outcome, error, log from attem
 
 -- name: images
 select k, image from replicate where cell_id = :cell_id and role = :role order by k;
+
+-- name: files_of_experiment
+-- One row per cell and file, in the order of the plan: the first picture of a cell, all that make up a reference.
+select wanted.position, cell.digest, replicate.image
+from experiment_cell as wanted
+join cell on cell.id = wanted.cell_id
+left join replicate
+    on replicate.cell_id = wanted.cell_id and replicate.role = wanted.role
+    and replicate.k < case wanted.role when 'reference' then wanted.replicates else 1 end
+where wanted.experiment_id = :experiment_id
+order by wanted.position, replicate.k;
 
 -- name: made_on
 -- The conditions under which an experiment's pictures were made, with the first and the last picture of each.

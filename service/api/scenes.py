@@ -12,7 +12,7 @@ from renderer.scenes import sources
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import SceneSource
 from service import bodies, schemas, uploads
-from service.deps import EngineDep
+from service.deps import EngineDep, StoreDep
 from service.problems import RESPONSES
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"], responses=RESPONSES)
@@ -26,9 +26,13 @@ ZIP = {
 
 
 @router.get("")
-def list_scenes() -> list[schemas.Scene]:
-    """The built-in scenes with what their files say about size, integrator and sampler."""
-    return [_scene(sources.find(name, Path())) for name in BUILTIN]
+def list_scenes(engine: EngineDep, store: StoreDep) -> list[schemas.Scene]:
+    """
+    The built-in scenes, then those that clients have brought, newest first, with what their files say about size,
+    integrator and sampler.
+    """
+    built_in = [sources.find(name, Path()) for name in BUILTIN]
+    return [_scene(source) for source in [*built_in, *uploads.everything(store, engine.artifacts)]]
 
 
 @router.post("", openapi_extra=ZIP, status_code=201)
