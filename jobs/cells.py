@@ -47,8 +47,11 @@ def page(store: Store, experiment: int, *, after: int = 0, start: int = 0, limit
 
 
 def touched(store: Store, experiment: int, after: int) -> bool:
-    """Whether something happened to the experiment itself since that revision."""
-    return bool(store.value("experiment_touched", experiment_id=experiment, after=after))
+    """
+    Whether all of an experiment may have changed since that revision: something happened to the experiment itself, or
+    the revision is of another, older database that was here before.
+    """
+    return after > store.revision() or bool(store.value("experiment_touched", experiment_id=experiment, after=after))
 
 
 def _cells(rows: Iterable[Row]) -> Iterator[Row]:
