@@ -76,7 +76,7 @@ export function attachGestures(stage, host) {
         ? pinch(view, size, box, [before, other], [spot, other])
         : pan(view, size, box, spot.x - before.x, spot.y - before.y),
     );
-    stage.classList.add("dragging");
+    stage.classList.add("viewer-dragging");
   }
 
   /** @param {PointerEvent} event */
@@ -84,7 +84,7 @@ export function attachGestures(stage, host) {
     if (!down.delete(event.pointerId) || down.size > 0) return;
     if (!dragging && pane && event.type === "pointerup") host.tap(pane.id);
     if (event.pointerType === "touch" && dragging) host.hover(null);
-    stage.classList.remove("dragging");
+    stage.classList.remove("viewer-dragging");
     pane = pressed = null;
     dragging = false;
   }

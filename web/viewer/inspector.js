@@ -46,7 +46,7 @@ export function Inspector({ panes, current, referenceOf, hover, settings, max })
       <${Channels} name=${seen.index < 0 ? "reference" : `picture ${seen.index + 1}`} value=${value} />
       ${seen.index >= 0 && html`<${Channels} name="reference" value=${other} />`}
       ${seen.index >= 0 && html`<${Channels} name="difference" value=${difference} signed />`}
-      ${mapOf(look) && html`<span class="viewer-channels mapped"><small>shown</small><b>${mappedText}</b></span>`}
+      ${mapOf(look) && html`<span class="viewer-channels" data-of="map"><small>shown</small><b>${mappedText}</b></span>`}
     </div>
     <${ColourBar} look=${lookOf(current, settings, max)} />
   </footer>`;
@@ -60,7 +60,7 @@ function pixelOf(pixels, { x, y }) {
 /** @param {{name: string, value: Rgb | null, signed?: boolean}} props @returns {VNode} */
 function Channels({ name, value, signed = false }) {
   const text = (/** @type {number} */ v) => (signed && v > 0 ? "+" : "") + compact(v, 4);
-  return html`<span class="viewer-channels ${name}">
+  return html`<span class="viewer-channels" data-of=${name}>
     <small>${name}</small>
     ${["r", "g", "b"].map((channel, i) => html`<b class=${channel}>${value ? text(value[i] ?? NaN) : ""}</b>`)}
   </span>`;

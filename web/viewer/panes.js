@@ -24,12 +24,15 @@ export function Badge({ index }) {
 }
 
 /**
- * "64 spp", and what was asked where the sampler rendered another number.
- * @param {ViewerPicture} picture @returns {string | null}
+ * What the label leaves to say, and nothing twice: "64 spp · path · cornell_box". Where the sampler rendered another
+ * number of samples than was asked, both.
+ * @param {ViewerPicture} picture @returns {string}
  */
-export function samples({ spp, sppAsked }) {
-  if (spp === undefined) return null;
-  return sppAsked === undefined || sppAsked === spp ? `${spp} spp` : `${spp} spp (${sppAsked} asked)`;
+export function about({ label, detail = "", spp, sppAsked = spp }) {
+  const rendered = spp === sppAsked ? `${spp} spp` : `${spp} spp (${sppAsked} asked)`;
+  const said = new Set([label, `${sppAsked} spp`, ...(spp === undefined ? [] : [rendered])]);
+  const rest = detail.split(" · ").filter((part) => part && !said.has(part));
+  return [...(spp === undefined || rendered === label ? [] : [rendered]), ...rest].join(" · ");
 }
 
 /**
@@ -39,12 +42,12 @@ export function samples({ spp, sppAsked }) {
  */
 export function Caption({ seen, metric, best, right }) {
   const { picture, index } = seen;
-  const details = [samples(picture), picture.detail].filter(Boolean).join(" · ");
+  const details = about(picture);
   return html`<header class="viewer-caption">
     <${Badge} index=${index} />
-    <strong class="name" title=${picture.label}>${picture.label}</strong>
-    <span class="viewer-detail name" title=${details}>${details}</span>
-    <span class="spacer"></span>
+    <strong class="viewer-line" title=${picture.label}>${picture.label}</strong>
+    <span class="viewer-detail viewer-line" title=${details}>${details}</span>
+    <span class="viewer-spacer"></span>
     ${
       index < 0
         ? html`<span class="viewer-what">reference</span>`
@@ -56,7 +59,7 @@ export function Caption({ seen, metric, best, right }) {
 
 /** @param {{seen: Seen}} props @returns {VNode} */
 function Right({ seen: { index, picture } }) {
-  return html`<span class="viewer-right"><${Badge} index=${index} /><strong class="name">${picture.label}</strong></span>`;
+  return html`<span class="viewer-right"><${Badge} index=${index} /><strong class="viewer-line">${picture.label}</strong></span>`;
 }
 
 /** @param {{picture: ViewerPicture, metric: Metric, best: boolean}} props @returns {VNode | null} */
@@ -64,7 +67,7 @@ export function ErrorValue({ picture: { error, spread }, metric, best }) {
   if (!metric || error === undefined || error === null) return null;
   const { line, formula } = metric;
   const title = [`${line}: ${formula}`, spread && "± standard error", best && "the lowest of the row"].filter(Boolean);
-  return html`<span class="viewer-error number ${best ? "best" : ""}" title=${title.join("; ")}>
+  return html`<span class="viewer-error number ${best ? "viewer-best" : ""}" title=${title.join("; ")}>
     <span class="viewer-metric">${metric.name}</span> ${number(error)}
     ${spread ? html`<small> ± ${number(spread, 2)}</small>` : null}
   </span>`;
@@ -86,13 +89,13 @@ export function Message({ seen, onRetry, small = false }) {
       failed: "failed",
       skipped: "not loaded",
     }[kind];
-    return html`<span class="viewer-message ${kind}" title=${text}>${word}</span>`;
+    return html`<span class="viewer-message" data-kind=${kind} title=${text}>${word}</span>`;
   }
   const again =
     url &&
     html`<button class="button" onClick=${() => onRetry(url)}>${kind === "skipped" ? "Load it" : "Try again"}</button>`;
   const role = kind === "failed" ? "alert" : "status";
-  return html`<div class="viewer-message ${kind}" role=${role}><p>${text}</p>${again}</div>`;
+  return html`<div class="viewer-message" data-kind=${kind} role=${role}><p>${text}</p>${again}</div>`;
 }
 
 /**
@@ -103,8 +106,8 @@ export function Message({ seen, onRetry, small = false }) {
  * @returns {VNode}
  */
 export function Pane({ seen, right, current, best, metric, onRetry, children }) {
-  const kind = `${current ? "current" : ""} ${seen.index < 0 ? "reference" : ""}`;
-  return html`<section class="viewer-pane ${kind}" aria-label=${seen.picture.label}>
+  const of = seen.index < 0 ? "reference" : "picture";
+  return html`<section class="viewer-pane" data-of=${of} aria-current=${current} aria-label=${seen.picture.label}>
     <${Caption} seen=${seen} metric=${metric} best=${best} right=${right} />
     <div class="viewer-picture" data-view=${seen.id}>
       <${Message} seen=${seen} onRetry=${onRetry} />
@@ -122,14 +125,14 @@ export function Tile({ seen, pressed, best, metric, onPick }) {
   const title = index < 0 ? "The reference (hold Shift)" : `${picture.label}${index < 9 ? ` (${index + 1})` : ""}`;
   const shape = { aspectRatio: `${seen.size.width} / ${seen.size.height}` };
   return html`<button
-    class="viewer-tile ${index < 0 ? "reference" : ""}" aria-pressed=${pressed} title=${title} onClick=${onPick}
+    class="viewer-tile" data-of=${index < 0 ? "reference" : "picture"} aria-pressed=${pressed} title=${title} onClick=${onPick}
   >
     <span class="viewer-thumb" data-view=${seen.id} style=${shape}>
       <${Message} seen=${seen} onRetry=${onPick} small />
     </span>
     <span class="viewer-about">
       <span class="viewer-name"><${Badge} index=${index} /> <strong>${picture.label}</strong></span>
-      <small class="viewer-detail">${[samples(picture), picture.detail].filter(Boolean).join(" · ")}</small>
+      <small class="viewer-detail">${about(picture)}</small>
       <${ErrorValue} picture=${picture} metric=${metric} best=${best} />
     </span>
   </button>`;

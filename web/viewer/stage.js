@@ -112,7 +112,7 @@ export function Stage(props) {
   const columns = wipe ? 1 : bestColumns(panes.length, current.size, area, CAPTION);
   return html`<div class="viewer-body" ref=${body}>
     <canvas class="viewer-canvas" ref=${under} aria-hidden="true"></canvas>
-    <div class="viewer-panes ${settings.layout}" style=${{ gridTemplateColumns: `repeat(${columns}, minmax(0, 1fr))` }}>
+    <div class="viewer-panes" data-layout=${settings.layout} style=${{ gridTemplateColumns: `repeat(${columns}, minmax(0, 1fr))` }}>
       ${(wipe ? panes.slice(0, 1) : panes).map(
         (seen) => html`<${Pane}
           key=${seen.id} seen=${seen} right=${wipe ? panes[1] : undefined} metric=${metric} best=${seen.index === best}
@@ -131,7 +131,7 @@ export function Stage(props) {
       )}
     </nav>`
     }
-    <canvas class="viewer-canvas over" ref=${over} aria-hidden="true"></canvas>
+    <canvas class="viewer-canvas viewer-over" ref=${over} aria-hidden="true"></canvas>
     ${failure && html`<div class="viewer-failure" role="alert"><p>${failure}</p></div>`}
   </div>`;
 }

@@ -73,7 +73,7 @@ export function Toolbar({ settings, max, zoom, comparable, act, onClose }) {
       <${Tool} on=${settings.zoom === null} label="Fit" title="the whole picture (0)" onClick=${act.fit} />
       <${Tool} label="100 %" title="one screen pixel per pixel (double click)" onClick=${act.actual} />
     </div>
-    <span class="spacer"></span>
+    <span class="viewer-spacer"></span>
     <button class="viewer-tool viewer-close" aria-label="Close" title="Close (Escape)" onClick=${onClose}>
       <${Icon} name="close" />
     </button>
@@ -106,8 +106,8 @@ function Tool({ label, title, on, disabled = false, onClick }) {
 function Stepper({ name, keys, value, less, more, onLess, onMore }) {
   return html`<div class="viewer-group" role="group" aria-label=${name}>
     ${keys && html`<span class="viewer-label">${name} <kbd>${keys}</kbd></span>`}
-    <button class="viewer-tool square" aria-label="${name}: ${less}" title=${less} onClick=${onLess}>−</button>
+    <button class="viewer-tool viewer-square" aria-label="${name}: ${less}" title=${less} onClick=${onLess}>−</button>
     <output class="viewer-value number">${value}</output>
-    <button class="viewer-tool square" aria-label="${name}: ${more}" title=${more} onClick=${onMore}>+</button>
+    <button class="viewer-tool viewer-square" aria-label="${name}: ${more}" title=${more} onClick=${onMore}>+</button>
   </div>`;
 }

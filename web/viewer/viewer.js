@@ -32,7 +32,7 @@ import { Toolbar } from "./toolbar.js";
  * @typedef {object} ViewerPicture
  * @property {string} key       its identity in the row, kept when its pixels change
  * @property {string} label     what tells it from its neighbours: "stratified"
- * @property {string} [detail]  the rest of what it is: "path · cornell_box"
+ * @property {string} [detail]  the rest of what it is: "path · cornell_box"; parts that the label says are left out
  * @property {number} cell
  * @property {"cell" | "reference"} [role]
  * @property {number | "mean"} [k] replicate; default: the server's (0 of a cell, the mean of a reference)
