@@ -139,7 +139,9 @@ def _cookie(request: Request) -> str:
 def _with_headers(send: Send) -> Send:
     async def add(message: Message) -> None:
         if message["type"] == "http.response.start":
-            message = {**message, "headers": [*message.get("headers", []), *HEADERS.items()]}
+            own = message.get("headers", [])
+            brought = {name.lower() for name, _ in own}  # a report has a policy of its own
+            message = {**message, "headers": [*own, *(item for item in HEADERS.items() if item[0] not in brought)]}
         await send(message)
 
     return add

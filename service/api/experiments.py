@@ -170,10 +170,12 @@ def results_json(engine: EngineDep, found: ExperimentDep) -> StreamingResponse:
 @router.get("/{experiment_id}/report", response_class=Response, responses={200: {"content": {"text/html": {}}}})
 def report(engine: EngineDep, store: StoreDep, found: ExperimentDep, download: bool = False) -> Response:
     """The experiment as one HTML file that needs nothing else; `download` gives it a file name."""
-    from service.report import render_report
+    from service.report import SERVED_POLICY, render_report
 
     text = render_report(store, engine.artifacts, found.id)
-    headers = {"content-disposition": f'attachment; filename="dartboard-{found.id}.html"'} if download else {}
+    headers = {"content-security-policy": SERVED_POLICY}
+    if download:
+        headers["content-disposition"] = f'attachment; filename="dartboard-{found.id}.html"'
     return Response(text, media_type="text/html; charset=utf-8", headers=headers)
 
 

@@ -1,0 +1,107 @@
+"""The set-up: what was asked, in the words of the catalog."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from jobs.store import Row
+from renderer import catalog
+from renderer.scenes.builtin import BUILTIN, BuiltinScene
+from renderer.spec import Choice
+from service.report.panels import label
+from service.report.reading import Reading
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """
+    A sampler or an integrator as the grid has it.
+
+    parameters  every one with its value
+    spp         samplers: what was asked → what is rendered
+    """
+
+    label: str
+    line: str
+    source: str
+    parameters: list[tuple[str, str]]
+    spp: list[tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """
+    A scene with its settings.
+
+    about      what the catalog says of a built-in one
+    width, height  of its pictures, in pixels
+    reference  how it is made, None where none was asked
+    uploaded   digest of its snapshot, where it is not built in
+    """
+
+    name: str
+    about: BuiltinScene | None
+    width: int
+    height: int
+    max_depth: int
+    reference: str | None
+    uploaded: str | None
+
+
+@dataclass(frozen=True)
+class Setup:
+    scenes: list[Scene]
+    samplers: list[Plugin]
+    integrators: list[Plugin]
+    rfilter: str
+    colour: str
+
+    def sizes(self) -> dict[str, tuple[int, int]]:
+        """Of pictures, by scene."""
+        return {scene.name: (scene.width, scene.height) for scene in self.scenes}
+
+    @property
+    def rounded(self) -> bool:
+        """Whether any sampler renders another spp than was asked."""
+        return any(asked != rendered for sampler in self.samplers for asked, rendered in sampler.spp)
+
+
+def of(reading: Reading) -> Setup:
+    grid = reading.grid
+    return Setup(
+        [_scene(scene, reading) for scene in grid["scenes"]],
+        [_plugin("sampler", item, grid["spp"]) for item in grid["samplers"]],
+        [_plugin("integrator", item, []) for item in grid["integrators"]],
+        label("rfilter", grid["rfilter"]), grid["colour"],
+    )  # fmt: skip
+
+
+def _plugin(axis: str, item: Row, spp: list[int]) -> Plugin:
+    choice = Choice.of(item)
+    entry = catalog.find(axis, choice.name)
+    return Plugin(
+        catalog.label(axis, choice), entry.line, entry.source,
+        [(key, _shown(value)) for key, value in choice.parameters],
+        [(asked, catalog.rendered_spp(choice, asked)) for asked in spp],
+    )  # fmt: skip
+
+
+def _shown(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _scene(scene: Row, reading: Reading) -> Scene:
+    uploaded = reading.uploaded.get(scene["name"])
+    width, height = (scene["crop"] or [0, 0, scene["width"], scene["height"]])[2:]
+    return Scene(
+        scene["name"], None if uploaded else BUILTIN.get(scene["name"]), width, height, scene["max_depth"],
+        _reference(scene["reference"]), uploaded,
+    )  # fmt: skip
+
+
+def _reference(reference: Row | None) -> str | None:
+    if reference is None:
+        return None
+    made = f"{label('integrator', reference['integrator'])}, {label('sampler', reference['sampler'])}"
+    return f"{made}, {reference['replicates']} × {reference['spp']} spp"
