@@ -4,23 +4,14 @@ import { html } from "../vendor/preact-htm.js";
 import { registered } from "../keys.js";
 import { Dialog } from "../parts/dialog.js";
 import { Icon } from "../parts/icons.js";
+import { shortcuts as viewerShortcuts } from "../viewer/actions.js";
 
 /** @typedef {import("../keys.js").Shortcut} Shortcut */
 
-/** The keys of the viewer are a convention of the whole tool (tev and its kin), so they can be looked up anywhere. */
+/** The keys of the viewer can be looked up anywhere: they are a convention of such tools (tev and its kin). */
 const VIEWER = "Viewer";
 /** @type {readonly Shortcut[]} */
-const VIEWER_KEYS = [
-  { shown: "1 … 9", does: "picture n of the row" },
-  { shown: "Shift", does: "the reference while held, back on release" },
-  { shown: "← → ↑ ↓", does: "along the columns and the rows of the grid" },
-  { shown: "e / Shift+e", does: "half a stop brighter, darker" },
-  { shown: "r", does: "exposure back to 0" },
-  { shown: "n", does: "normalise" },
-  { shown: "f / Shift+f", does: "maximum of the false colours up, down" },
-  { shown: "t", does: "next tone map: sRGB, gamma 2.2, false colour, signed" },
-  { shown: "wheel, drag", does: "zoom at the cursor, pan" },
-];
+const VIEWER_KEYS = viewerShortcuts(/** @type {any} */ ({})); // listed, never run
 
 /** @param {{onClose: () => void}} props */
 export function Help({ onClose }) {
