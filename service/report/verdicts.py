@@ -16,7 +16,7 @@ from service.report.panels import Line, Panel
 
 MOST_NAMED = 4
 P95 = "95\u00a0%"
-APART = f"with a {P95} interval apart from all others"
+APART = f"a {P95} interval apart from all others"
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def overall(found: list[Verdict]) -> str | None:
         [sampler] = wins
         sure = {0: "in none of them", len(chosen): "in each"}.get(certain[sampler], f"in {certain[sampler]} of them")
         both = "both" if len(chosen) == 2 else f"all {len(chosen)}"
-        return f"In {both} comparisons {sampler} has the lowest error, {sure} {APART}."
+        return f"In {both} comparisons {sampler} has the lowest error, {sure} with {APART}."
     parts = [f"{sampler} ({_often(times, certain[sampler])})" for sampler, times in wins.most_common()]
     return f"In {len(chosen)} comparisons the lowest error belongs to {joined(parts)}; certain means {APART}."
 
