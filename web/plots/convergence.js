@@ -270,8 +270,7 @@ function bands(panel, plan, options) {
     const colour = translucent(curve.colour, !curve.fair || stepsBack(curve.series, options) ? 0.04 : 0.17);
     const fill = fills.get(colour) ?? { x: [], y: [] };
     fills.set(colour, fill);
-    // An interval that reaches below zero leaves a logarithmic plot at its lower edge.
-    const low = points.map((point) => (plan.log && Number(point.low) <= 0 ? point.mean * 1e-3 : Number(point.low)));
+    const low = points.map((point) => (plan.log && reachesZero(point) ? point.mean ** 2 / Number(point.high) : Number(point.low)));
     const x = points.map((point) => xOf(point, options));
     fill.x.push(...x, ...x.toReversed(), null);
     fill.y.push(...points.map((point) => point.high), ...low.reverse(), null);
@@ -304,6 +303,11 @@ function line(curve, panel, convergence, plan, options) {
       line: { color: plan.ink.text, width: marked.map((is) => (is ? 2 : 0)) },
     },
   };
+}
+
+/** Whether an interval has no lower end on a logarithmic axis; it is drawn as far down as up. @param {Point} point */
+export function reachesZero(point) {
+  return point.low !== null && point.low <= 0;
 }
 
 /** @param {Series} series @param {Options} options */

@@ -5,6 +5,7 @@
  * The model holds what the service says, the address what the page is set to; everything here is drawn from the two.
  */
 import { html, useEffect, useMemo, useReducer, useRef, useState } from "../vendor/preact-htm.js";
+import { setParams as set, useRoute } from "../address.js";
 import { ExperimentModel } from "../model.js";
 import { toast } from "../parts/toast.js";
 import { sharedMaximum } from "./experiment/compare.js";
@@ -19,7 +20,7 @@ import { Log } from "./experiment/log.js";
 import { Plot } from "./experiment/plot.js";
 import { Table } from "./experiment/table.js";
 import { Toolbar } from "./experiment/toolbar.js";
-import { placeAt, selecting, useView } from "./experiment/view.js";
+import { placeAt, selecting, viewOf } from "./experiment/view.js";
 import { RowViewer } from "./experiment/viewing.js";
 import { DeletedExperiment, Failure, Loading } from "./states.js";
 
@@ -64,7 +65,9 @@ function Followed({ id, onAgain }) {
 function Page({ model, detail, onDeleted }) {
   const slow = useSlowly(model.revision, SLOW_MS);
   const spp = useMemo(() => usualSpp(model, detail), [model, detail, slow]);
-  const [view, set] = useView(detail, spp);
+  const { params } = useRoute();
+  const text = params.toString();
+  const view = useMemo(() => viewOf(new URLSearchParams(text), detail, spp), [text, detail, spp]);
   const [logged, setLogged] = useState(/** @type {number | null} */ (null));
   const [near, watch] = useNear();
   const curves = useCurves(model.id, { metric: view.metric.name, scene: view.at["scene"] ?? "", revision: model.revision, near });
@@ -78,7 +81,7 @@ function Page({ model, detail, onDeleted }) {
   );
   const max = view.scale ?? shared;
 
-  const act = useActions({ model, view, set, setLogged });
+  const act = useActions({ model, view, setLogged });
   const log = logged === null ? undefined : model.cells[logged];
   const selected = view.selected === null ? undefined : model.cells[view.selected];
   return html`<div class="page experiment">
@@ -100,18 +103,18 @@ function Page({ model, detail, onDeleted }) {
 
 /**
  * What a click does. The functions stay the same from draw to draw, so that tiles need not be drawn again for them.
- * @param {{model: ExperimentModel, view: View, set: typeof import("../address.js").setParams, setLogged: (position: number | null) => void}} of
+ * @param {{model: ExperimentModel, view: View, setLogged: (position: number | null) => void}} of
  */
 function useActions(of) {
   const now = useRef(of);
   now.current = of;
   return useMemo(() => {
     /** @param {Cell} cell */
-    const select = (cell) => now.current.set(selecting(now.current.view, cell));
+    const select = (cell) => set(selecting(now.current.view, cell));
     /** @param {Cell} cell */
     const open = (cell) => {
       if (cell.had === 0 && !now.current.model.progressOf(cell)) return select(cell);
-      now.current.set({ ...selecting(now.current.view, cell), viewer: "open" }, { push: true });
+      set({ ...selecting(now.current.view, cell), viewer: "open" }, { push: true });
     };
     /** @param {number} position */
     const openAt = (position) => {
@@ -130,7 +133,7 @@ function useActions(of) {
     /** Rows of the table, wherever they are hidden. @param {string} q */
     const filter = (q) => {
       const shown = now.current.view.axes.map(({ name }) => [`hide.${name}`, null]);
-      now.current.set({ ...Object.fromEntries(shown), q });
+      set({ ...Object.fromEntries(shown), q });
       document.getElementById("table")?.scrollIntoView({ block: "start" });
     };
     return { select, open, openAt, openCell, log, filter };

@@ -95,8 +95,8 @@ function sorted(value) {
 export function matching(columns, filter) {
   const words = filter.toLowerCase().split(/\s+/).filter(Boolean);
   const tests = words.map((word) => {
-    const [name, wanted] = word.split("=", 2);
-    const column = wanted === undefined ? undefined : columns.find((one) => one.name.toLowerCase() === name);
+    const [, name, wanted] = /^([^=]+)=(.+)$/.exec(word) ?? [];
+    const column = columns.find((one) => one.name.toLowerCase() === name);
     if (!column) return (/** @type {Cell} */ cell) => textOf(cell, columns).includes(word);
     return (/** @type {Cell} */ cell) => String(column.value(cell)).toLowerCase() === wanted;
   });

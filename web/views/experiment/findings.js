@@ -2,7 +2,7 @@
 /**
  * What can be said for certain from the numbers of an experiment, in plain words. Pure.
  *
- * A finding is no guess: it is counted, or chance would produce it less than once in a hundred such experiments.
+ * A finding is no guess: it is counted, or chance would produce it less than once in a thousand such experiments.
  */
 import { counted } from "../../format.js";
 import { estimateOf } from "./compare.js";
@@ -11,20 +11,21 @@ import { combined, tail } from "./chance.js";
 /** @typedef {import("../../api.js").Cell} Cell */
 /** @typedef {import("../../api.js").ExperimentDetail} ExperimentDetail */
 /** @typedef {import("../../api.js").Series} Series */
+/** @typedef {import("./compare.js").Estimate} Estimate */
 /** @typedef {{kind: "bad" | "warn" | "note", text: string, cell?: number, filter?: string}} Finding
  * `cell`: position of a cell that shows it; `filter`: words that leave its rows in the table */
 
-const CHANCE = 0.01; // of one false alarm in the whole experiment
+const CHANCE = 0.001; // of one false alarm in the whole experiment: a page that is live asks many times
 const LEAST = 3; // standard errors from 1 that a brightness must be, somewhere on its curve
 const MOST = 4; // curves that are named before "and 3 more"
 
 /** @param {ExperimentDetail} detail @param {readonly (Cell | undefined)[]} all @param {readonly Series[]} series @returns {Finding[]} */
 export function findings(detail, all, series) {
   const cells = /** @type {Cell[]} */ (all.filter((cell) => cell?.role === "cell"));
-  const everything = /** @type {Cell[]} */ (all.filter(Boolean));
+  const references = /** @type {Cell[]} */ (all.filter((cell) => cell?.role === "reference"));
   return [
-    ...failures(everything),
-    ...biases(cells),
+    ...failures([...cells, ...references]),
+    ...biases(cells, references),
     ...timings(series),
     ...missingReferences(detail),
     ...ownReferences(cells),
@@ -47,43 +48,34 @@ function failures(cells) {
   return [{ kind: "bad", text, filter: "failed", ...(failed.length === 1 && failed[0] ? { cell: failed[0].position } : {}) }];
 }
 
-/**
- * Curves whose brightness chance does not explain. Where it is most curves of a reference, and all on one side, the
- * reference is to blame: its own noise shifts them together.
- * @param {readonly Cell[]} cells @returns {Finding[]}
- */
-function biases(cells) {
-  const curves = brightnesses(cells);
+/** Curves whose brightness chance does not explain. @param {readonly Cell[]} cells @param {readonly Cell[]} references @returns {Finding[]} */
+function biases(cells, references) {
+  const curves = brightnesses(cells, references);
   const suspects = curves.filter(({ off, chance }) => off > LEAST && chance * curves.length < CHANCE);
   /** @type {Finding[]} */
-  const told = [];
-  for (const reference of new Set(suspects.map((curve) => curve.reference))) {
-    const company = curves.filter((curve) => curve.reference === reference);
-    const off = suspects.filter((curve) => curve.reference === reference);
-    const brighter = off.filter((curve) => curve.ratio.mean > 1).length;
-    if (company.length > 1 && 2 * off.length > company.length && (brighter === 0 || brighter === off.length)) {
-      told.push({ kind: "warn", text: referenceText(company, off), cell: off[0]?.cell.position });
-    } else {
-      told.push(...off.slice(0, MOST).map((curve) => ({ kind: /** @type {const} */ ("warn"), text: biasText(curve), cell: curve.cell.position })));
-      if (off.length > MOST) told.push({ kind: "warn", text: `and ${counted(off.length - MOST, "more curve")} like that` });
-    }
-  }
+  const told = suspects.slice(0, MOST).map((curve) => ({ kind: "warn", text: biasText(curve), cell: curve.cell.position }));
+  if (suspects.length > MOST) told.push({ kind: "warn", text: `and ${counted(suspects.length - MOST, "more curve")} like that` });
   return told;
 }
 
-/** @typedef {{reference: number | null, cell: Cell, ratio: import("./compare.js").Estimate, off: number, chance: number}} Brightness
+/** @typedef {{cell: Cell, ratio: Estimate, off: number, chance: number}} Brightness
  * of a curve: its cell that is farthest off, in standard errors, and the probability that chance alone does that to the curve */
 
-/** @param {readonly Cell[]} cells @returns {Brightness[]} */
-function brightnesses(cells) {
+/** Farthest off first. @param {readonly Cell[]} cells @param {readonly Cell[]} references @returns {Brightness[]} */
+function brightnesses(cells, references) {
+  const measured = cells.flatMap((cell) => {
+    const ratio = estimateOf(cell, "mean_ratio");
+    return ratio?.se && ratio.n > 1 ? [{ cell, ratio, se: ratio.se }] : [];
+  });
+  const noise = referenceNoise(measured, references);
   /** @type {Map<string, Brightness & {points: number, logs: number}>} */
   const curves = new Map();
-  for (const cell of cells) {
-    const ratio = estimateOf(cell, "mean_ratio");
-    if (!ratio || !ratio.se || ratio.n < 2) continue;
-    const off = Math.abs(ratio.mean - 1) / ratio.se;
+  for (const { cell, ratio, se } of measured) {
+    const own = noise.get(cell.reference ?? NaN);
+    if (own === undefined) continue;
+    const off = Math.abs(ratio.mean - 1) / Math.hypot(se, own);
     const key = JSON.stringify([cell.scene, cell.integrator, cell.sampler, cell.sweep]);
-    const curve = curves.get(key) ?? { reference: cell.reference ?? null, cell, ratio, off, chance: 1, points: 0, logs: 0 };
+    const curve = curves.get(key) ?? { cell, ratio, off, chance: 1, points: 0, logs: 0 };
     curve.points += 1;
     curve.logs += Math.log(Math.max(Number.MIN_VALUE, tail(off, ratio.n - 1)));
     if (off > curve.off) Object.assign(curve, { cell, ratio, off });
@@ -92,23 +84,35 @@ function brightnesses(cells) {
   return [...curves.values()].map((curve) => ({ ...curve, chance: combined(curve.logs, curve.points) })).sort((a, b) => b.off - a.off);
 }
 
-/** @param {Brightness} curve */
-function biasText({ cell, ratio, off }) {
-  return (
-    `${cell.scene} · ${cell.integrator} · ${cell.sampler}: at ${cell.spp} spp mean_ratio ${ratio.mean.toFixed(4)} ± ` +
-    `${Number(ratio.se).toPrecision(2)} is ${off.toFixed(1)} standard errors from 1 (n = ${ratio.n}), and chance does not explain ` +
-    "the curve: its pictures or their reference are biased"
-  );
+/**
+ * By the `cell` of a reference, how noisy its brightness is at most, relative: as noisy as the noisiest curve would be
+ * with as many samples. All cells that are measured against it are off by that together.
+ * @param {readonly {cell: Cell, ratio: Estimate, se: number}[]} measured @param {readonly Cell[]} references
+ */
+function referenceNoise(measured, references) {
+  /** @type {Map<number, number>} */
+  const variances = new Map(); // of one sample per pixel
+  for (const { cell, ratio, se } of measured) {
+    if (cell.reference === null || cell.reference === undefined) continue;
+    variances.set(cell.reference, Math.max(variances.get(cell.reference) ?? 0, se * se * ratio.n * cell.spp_actual));
+  }
+  /** @type {Map<number, number>} */
+  const noise = new Map();
+  for (const { cell, had, spp_actual } of references) {
+    const variance = variances.get(cell);
+    if (variance !== undefined && had > 0) noise.set(cell, Math.sqrt(variance / (had * spp_actual)));
+  }
+  return noise;
 }
 
-/** @param {readonly Brightness[]} company @param {readonly Brightness[]} off */
-function referenceText(company, off) {
-  const [first] = off;
-  const side = (first?.ratio.mean ?? 1) > 1 ? "brighter" : "darker";
-  const percent = (100 * Math.abs((first?.ratio.mean ?? 1) - 1)).toPrecision(2);
+/** @param {Brightness} curve */
+function biasText({ cell, ratio, off }) {
+  const se = Number(ratio.se);
+  const digits = Math.min(6, Math.max(3, 1 - Math.floor(Math.log10(se))));
   return (
-    `${first?.cell.scene}: ${off.length} of ${company.length} curves are ${side} than their reference (${percent} %) by more than ` +
-    "chance explains: more likely the reference is not exact enough than all of them biased"
+    `${cell.scene} · ${cell.integrator} · ${cell.sampler}: at ${cell.spp} spp mean_ratio ${ratio.mean.toFixed(digits)} ± ` +
+    `${se.toFixed(digits)} (n = ${ratio.n}) is ${off.toFixed(1)} standard errors from 1, the reference's own noise included; ` +
+    "chance does not explain the curve: its pictures or their reference are biased"
   );
 }
 

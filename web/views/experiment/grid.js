@@ -36,7 +36,7 @@ const CAPTION = 44; // px: two lines under a picture
 const LABEL = 148; // px: the row's label, where there is room for a column of them
 const LINE = 26; // px: the row's label above the row, where there is not
 const HEAD = 34; // px: the line of column labels
-const NARROW = 640; // px: a phone
+const NARROW = 480; // px: a phone
 const FITTED = { least: 144, most: 240 }; // px: the width of a picture that follows the size of the grid
 const OUTSIDE = 200; // px of the window's height that the grid leaves to header and bar, as its style sheet says
 

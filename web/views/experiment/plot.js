@@ -3,7 +3,7 @@
  * The convergence plot: what is drawn is decided in `plots/convergence.js`; this fetches, draws and listens.
  */
 import { html, useEffect, useMemo, useRef, useState } from "../../vendor/preact-htm.js";
-import { layout, traces, unplottable } from "../../plots/convergence.js";
+import { layout, reachesZero, traces, unplottable } from "../../plots/convergence.js";
 import { plotly } from "../../plots/plotly.js";
 import { counted } from "../../format.js";
 import { useTheme } from "../../theme.js";
@@ -182,6 +182,9 @@ function notesOn(convergence, shown, view, options) {
   if (!n.length) return [];
   if (most > 1) notes.push(`Bands: 95 % interval of the mean over n = ${least === most ? most : `${least} to ${most}`} replicates. Click a point to see its picture.`);
   else notes.push("One replicate a point: there is no interval to draw. Click a point to see its picture.");
+  if (convergence.metric.lower_is_better !== null && shown.some((series) => series.points.some(reachesZero))) {
+    notes.push("Where an interval reaches zero, which a logarithmic axis does not have, its band goes as far down as up.");
+  }
   if (view.against === "seconds" && shown.some((series) => !series.alike)) {
     notes.push("Grey curves: their pictures were timed under different conditions (machine, threads or neighbours), so their seconds cannot be compared.");
   }

@@ -5,10 +5,8 @@
  * Exposure, tone and layout of the viewer are in the address too, under the names that `viewer/settings.js` gives them.
  * Every axis is either on the rows, on the columns, or *pinned* to one value; on any axis values may be hidden. What
  * the address does not say has a default, and a value that the grid does not have counts as not said, so an old or
- * mistyped link still opens. Pure, but for `useView`.
+ * mistyped link still opens. Pure: views change the address with `setParams`.
  */
-import { setParams, useRoute } from "../../address.js";
-import { useMemo } from "../../vendor/preact-htm.js";
 import { EV_LIMIT } from "../../viewer/settings.js";
 import { axesOf, placeOf, valueOn } from "./axes.js";
 
@@ -59,8 +57,8 @@ export function viewOf(params, detail, spp) {
   const at = {};
   for (const axis of axes) {
     const { values } = shown(axis);
-    const asked = params.get(axis.name) ?? (axis.name === "spp" ? spp : null);
-    at[axis.name] = (asked !== null && values.includes(asked) ? asked : values[0]) ?? "";
+    const wanted = [params.get(axis.name), axis.name === "spp" ? spp : null, values[0]];
+    at[axis.name] = wanted.find((value) => value && values.includes(value)) ?? "";
   }
   const tone = params.get("tone");
   return {
@@ -84,14 +82,6 @@ export function viewOf(params, detail, spp) {
     selected: params.has("cell") ? Number(params.get("cell")) : null,
     open: params.get("viewer") === "open",
   };
-}
-
-/** The view and how to change it: the same names as in the address, null for the default. @param {ExperimentDetail} detail @param {string | null} spp @returns {[View, typeof setParams]} */
-export function useView(detail, spp) {
-  const { params } = useRoute();
-  const text = params.toString();
-  const view = useMemo(() => viewOf(new URLSearchParams(text), detail, spp), [text, detail, spp]);
-  return [view, setParams];
 }
 
 /** The place at a row and a column. @param {View} view @param {string} row @param {string} col @returns {Place} */
