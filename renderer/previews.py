@@ -35,7 +35,7 @@ def shrink(picture: Floats, side: int) -> Floats:
     rows, columns = (_edges(count, max(1, round(count * scale))) for count in (height, width))
     sums = np.add.reduceat(np.add.reduceat(picture.astype(np.float64), rows, axis=0), columns, axis=1)
     counts = np.diff(rows, append=height)[:, None] * np.diff(columns, append=width)[None, :]
-    return np.asarray(sums / counts[:, :, None], np.float32)
+    return np.asarray(sums / counts[:, :, None], np.promote_types(picture.dtype, np.float32))
 
 
 def to_half(picture: Floats) -> NDArray[np.float16]:
@@ -55,29 +55,25 @@ def preview_png(picture: Floats, *, ev: float = 0.0, tone: str = "srgb", maximum
         raise UnknownName("tone", tone, "", TONES)
     if not -MAX_EV <= ev <= MAX_EV:
         raise BadParameter(f"ev = {ev} is not allowed; give a number from {-MAX_EV:g} to {MAX_EV:g}")
-    exposed = np.nan_to_num(picture, nan=0.0, posinf=0.0, neginf=0.0) * 2.0**ev
+    finite = np.isfinite(picture)
+    exposed = np.where(finite, picture, 0.0).astype(np.float64) * 2.0**ev  # radiance of float32 times 2²⁰ fits
     if tone == "falsecolour":
-        shown = _inferno(exposed @ np.array([0.2126, 0.7152, 0.0722]) / _positive(maximum))
+        shown = _inferno(exposed @ np.array([0.2126, 0.7152, 0.0722]), maximum)
     else:
         light = np.clip(exposed, 0.0, 1.0)
         curve = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
         shown = np.round((curve if tone == "srgb" else light ** (1 / 2.2)) * 255).astype(np.uint8)
-    shown[~np.isfinite(picture).all(axis=-1)] = MAGENTA
+    shown[~finite.all(axis=-1)] = MAGENTA
     return _png(shown)
 
 
 def error_png(error: Floats, maximum: float) -> bytes:
     """An error map (H, W, 3), as a metric gives it: the mean of its channels from 0 to ``maximum`` in inferno."""
-    mean = error.mean(axis=-1)
-    shown = _inferno(np.nan_to_num(mean) / _positive(maximum))
-    shown[~np.isfinite(mean)] = MAGENTA
+    mean = error.astype(np.float64).mean(axis=-1)
+    finite = np.isfinite(mean)
+    shown = _inferno(np.where(finite, mean, 0.0), maximum)
+    shown[~finite] = MAGENTA
     return _png(shown)
-
-
-def _positive(maximum: float) -> float:
-    if not (maximum > 0 and np.isfinite(maximum)):
-        raise BadParameter(f"max = {maximum} is not allowed; give a positive number")
-    return maximum
 
 
 def _edges(count: int, parts: int) -> NDArray[np.intp]:
@@ -85,9 +81,12 @@ def _edges(count: int, parts: int) -> NDArray[np.intp]:
     return np.arange(parts) * count // parts
 
 
-def _inferno(values: Floats) -> Bytes:
+def _inferno(values: Floats, maximum: float) -> Bytes:
+    """The colours of values from 0 to ``maximum``; all of them are finite. Raises ``BadParameter``."""
+    if not (maximum > 0 and np.isfinite(maximum)):
+        raise BadParameter(f"max = {maximum} is not allowed; give a positive number")
     colours = np.array([[int(text[i : i + 2], 16) for i in (0, 2, 4)] for text in INFERNO], float)
-    place = np.clip(values, 0.0, 1.0) * (len(colours) - 1)
+    place = np.clip(values, 0.0, maximum) / maximum * (len(colours) - 1)  # clipped first: no quotient is too large
     below = np.minimum(place.astype(int), len(colours) - 2)
     part = (place - below)[..., None]
     return np.asarray(np.round(colours[below] * (1 - part) + colours[below + 1] * part), np.uint8)
