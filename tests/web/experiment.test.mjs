@@ -174,9 +174,10 @@ test("a window holds what is visible and never leaves the list", () => {
 
 test("only cells with the same reference are compared", () => {
   const [a, b] = grid();
-  const better = { ...b, metrics: { relmse: [0.001, 0.0001, 4] } };
+  const better = { ...b, spp: 4, spp_actual: 4, metrics: { relmse: [0.001, 0.0001, 4] } };
   assert.equal(ranks([a, better], RELMSE).get(better.position), "best");
   assert.equal(ranks([a, { ...better, reference: 9 }], RELMSE).size, 0);
+  assert.equal(ranks([a, { ...better, spp_actual: 25 }], RELMSE).size, 0);
   assert.equal(ratioTo({ ...better, reference: 9 }, a, RELMSE), null);
   close(ratioTo(better, a, RELMSE), 0.001 / a.metrics.relmse[0]);
   assert.equal(ratioTo(a, a, RELMSE), 1);
@@ -184,7 +185,7 @@ test("only cells with the same reference are compared", () => {
 });
 
 test("who cannot be told from the best is tied with it, and a ratio near 1 has no best", () => {
-  const [a, b, c] = grid();
+  const [a, b, c] = grid((cell) => ({ ...cell, spp_actual: 25 }));
   const errors = [[1.0, 0.1], [1.2, 0.1], [1.4, 0.1]]; // prettier-ignore
   const cells = [a, b, c].map((cell, i) => ({ ...cell, metrics: { relmse: [...errors[i], 4], mean_ratio: [1, 0.1, 4] } }));
   const found = ranks(cells, RELMSE);

@@ -287,7 +287,7 @@ function line(curve, panel, convergence, plan, options) {
     type: "scatter",
     mode: plan.curves.length > MARKED ? "lines" : "lines+markers",
     ...axesOf(panel),
-    name: `${safe(nameOf(series))}  ${slopeText(series.slope)}`.trimEnd(),
+    name: `${safe(nameOf(series))}  ${plan.log ? slopeText(series.slope) : ""}`.trimEnd(),
     x: points.map((point) => xOf(point, options)),
     y: points.map((point) => point.mean),
     customdata: points.map((point) => point.cell),
@@ -331,7 +331,7 @@ function hover(series, point, convergence, fair) {
     `${interval}n = ${point.n}`,
     point.spp === point.spp_actual ? `${point.spp} spp` : `${point.spp} spp asked, ${point.spp_actual} rendered`,
     point.seconds === null ? "not timed" : `${point.seconds.toPrecision(3)} s a picture`,
-    ...(series.slope ? [`slope ${slopeText(series.slope)}`] : []),
+    ...(series.slope && isLog(convergence) ? [`slope ${slopeText(series.slope)}`] : []),
     ...(fair ? [] : ["timed under different conditions: not comparable"]),
   ].join("<br>");
 }

@@ -83,7 +83,7 @@ export function columnsOf(detail) {
 
 /** px for the longest of some texts, within reason. @param {readonly string[]} texts */
 function widthOf(texts) {
-  return Math.min(190, Math.max(84, 20 + 7 * Math.max(...texts.map((text) => text.length))));
+  return Math.min(190, Math.max(84, 20 + 7.6 * Math.max(...texts.map((text) => text.length))));
 }
 
 /** Swept numbers sort as numbers. @param {string | null} value */

@@ -32,8 +32,8 @@ export function ratioTo(cell, baseline, metric) {
 }
 
 /**
- * Which cells of a line are best: among those of one reference, the lowest error and whatever cannot be told from it.
- * A cell without company has no rank.
+ * Which cells of a line are best: among those of one reference that were rendered with equally many samples, the lowest
+ * error and whatever cannot be told from it. A cell without company has no rank.
  * @param {readonly Cell[]} cells @param {MetricInfo} metric @returns {Map<number, Rank>} by position
  */
 export function ranks(cells, metric) {
@@ -41,14 +41,15 @@ export function ranks(cells, metric) {
   const found = new Map();
   if (metric.lower_is_better === null) return found;
   const sign = metric.lower_is_better ? 1 : -1;
-  /** @type {Map<number, {cell: Cell, estimate: Estimate}[]>} */
+  /** @type {Map<string, {cell: Cell, estimate: Estimate}[]>} */
   const groups = new Map();
   for (const cell of cells) {
     const estimate = estimateOf(cell, metric.name);
     if (!estimate || cell.reference === null || cell.reference === undefined) continue;
-    const group = groups.get(cell.reference) ?? [];
+    const alike = `${cell.reference} ${cell.spp_actual}`;
+    const group = groups.get(alike) ?? [];
     group.push({ cell, estimate });
-    groups.set(cell.reference, group);
+    groups.set(alike, group);
   }
   for (const group of groups.values()) {
     const [best, ...rest] = group.sort((a, b) => sign * (a.estimate.mean - b.estimate.mean));

@@ -37,7 +37,7 @@ const LABEL = 148; // px: the row's label, where there is room for a column of t
 const LINE = 26; // px: the row's label above the row, where there is not
 const HEAD = 34; // px: the line of column labels
 const NARROW = 480; // px: a phone
-const FITTED = { least: 144, most: 240 }; // px: the width of a picture that follows the size of the grid
+const FITTED = { narrowest: 112, least: 144, most: 240 }; // px: the width of a picture that follows the size of the grid
 const OUTSIDE = 200; // px of the window's height that the grid leaves to header and bar, as its style sheet says
 
 /** @param {Props} props */
@@ -144,7 +144,9 @@ export function ImageGrid({ model, view, max, onSelect, onOpen, onLog }) {
           ${shownCols.map((col) => html`<div class="grid-above" role="gridcell" key=${col}>${reference(undefined, col)}</div>`)}
         </div>
       </div>`}
-      ${references.side === "one" && html`<div class="grid-one" style=${{ top: `${HEAD + (narrow ? LINE : 0)}px` }}>${reference(undefined, undefined)}</div>`}
+      ${references.side === "one" && html`<div class="grid-one" role="row" style=${{ top: `${HEAD + (narrow ? LINE : 0)}px` }}>
+        <div role="gridcell">${reference(undefined, undefined)}</div>
+      </div>`}
       ${rows.values.slice(firstRow, lastRow).map((row, i) => line(row, firstRow + i))}
     </div>
   </div>`;
@@ -175,7 +177,8 @@ function sizeOf(view, aspect, { width, narrow, beside, above }) {
   const rows = view.rows.values.length + Number(above);
   const wide = Math.floor((width - (narrow ? GAP : LABEL)) / columns) - GAP;
   const high = Math.floor(((innerHeight - OUTSIDE - HEAD) / rows - CAPTION - GAP) / aspect);
-  return Math.min(FITTED.most, Math.max(FITTED.least, Math.min(wide, narrow ? wide : high)));
+  const fitted = narrow ? wide : Math.min(wide, Math.max(FITTED.least, high));
+  return Math.min(FITTED.most, Math.max(FITTED.narrowest, fitted));
 }
 
 /** Sizes in px; equal for all tiles, so that places can be computed. @param {ExperimentModel} model @param {View} view @param {Room} room */

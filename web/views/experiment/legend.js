@@ -24,10 +24,10 @@ const MARKERS = /** @type {Record<string, string>} */ ({
 });
 
 /**
- * @param {{series: readonly Series[], view: View, options: Options, set: typeof import("../../address.js").setParams,
+ * @param {{series: readonly Series[], sloped: boolean, view: View, options: Options, set: typeof import("../../address.js").setParams,
  *   onEmphasis: (of: {sampler?: string, integrator?: string} | null) => void}} props
  */
-export function Legend({ series, view, options, set, onEmphasis }) {
+export function Legend({ series, sloped, view, options, set, onEmphasis }) {
   const integrators = view.axes.find(({ name }) => name === "integrator")?.values ?? [];
   const samplers = view.axes.find(({ name }) => name === "sampler")?.values ?? [];
   const of = new Map(series.map((one) => [`${one.sampler}\n${one.integrator}`, one]));
@@ -55,7 +55,7 @@ export function Legend({ series, view, options, set, onEmphasis }) {
       <caption class="unseen">Legend, with the slope of each curve and half of its 95 % interval</caption>
       <thead>
         <tr>
-          <th scope="col" class="legend-corner" title="exponent b of error ~ spp^b, with half of its 95 % interval">slope ± 95 %</th>
+          <th scope="col" class="legend-corner" title="exponent b of error ~ spp^b, with half of its 95 % interval">${sloped && "slope ± 95 %"}</th>
           ${integrators.map((integrator) => html`<th scope="col" key=${integrator}>${toggle("integrator", integrator)}</th>`)}
         </tr>
       </thead>
@@ -72,7 +72,7 @@ export function Legend({ series, view, options, set, onEmphasis }) {
                 onMouseEnter=${() => onEmphasis(hidden ? null : { sampler, integrator })}
                 onMouseLeave=${() => onEmphasis(null)}
               >
-                ${slope || "–"}
+                ${sloped && (slope || "–")}
               </td>`;
             })}
           </tr>`,

@@ -85,7 +85,7 @@ export function Plot({ view, curves, selected, near, onElement, set, onPoint }) 
       <${Figure} convergence=${convergence} options=${options} near=${near} onWidth=${setWidth} onPoint=${onPoint}>
         ${convergence && !shown.some((series) => series.points.length) && html`<p class="figure-empty muted">No curve yet: a point appears once a cell and its reference are rendered and measured.</p>`}
       <//>
-      ${convergence && html`<${Legend} series=${convergence.series.filter((series) => isPinned(view, series))} view=${view} options=${options} set=${set} onEmphasis=${setEmphasis} />`}
+      ${convergence && html`<${Legend} series=${convergence.series.filter((series) => isPinned(view, series))} sloped=${convergence.metric.lower_is_better !== null} view=${view} options=${options} set=${set} onEmphasis=${setEmphasis} />`}
     </div>
     <ul class="part-notes">
       ${notesOn(convergence, shown, view, options).map((note) => html`<li key=${note}>${note}</li>`)}

@@ -26,7 +26,7 @@ import { usePort, windowOf } from "./window.js";
  */
 
 const ROW = 32; // px
-const LOG = 48; // px: the last column
+const ACTIONS = 92; // px: the last column
 
 /** @param {Props} props */
 export function Table({ model, view, revision, set, onSelect, onOpen, onLog }) {
@@ -85,11 +85,11 @@ export function Table({ model, view, revision, set, onSelect, onOpen, onLog }) {
       <a href=${experiments.csvUrl(model.id)} download>CSV</a>
       <a href=${experiments.jsonUrl(model.id)} download>JSON</a>
     </div>
-    <div class="table-scroller" ref=${scroller} tabindex="0" role="region" aria-labelledby="table-title">
-      <table style=${{ minWidth: `${columns.reduce((sum, column) => sum + column.width, LOG)}px` }} aria-rowcount=${cells.length + 1}>
+    <div class="table-scroller" ref=${scroller} tabindex="0" role="group" aria-label="Rows">
+      <table style=${{ minWidth: `${columns.reduce((sum, column) => sum + column.width, ACTIONS)}px` }} aria-rowcount=${cells.length + 1}>
         <colgroup>
           ${columns.map((column) => html`<col key=${column.name} style=${{ width: `${column.width}px` }} />`)}
-          <col style=${{ width: `${LOG}px` }} />
+          <col style=${{ width: `${ACTIONS}px` }} />
         </colgroup>
         <thead>
           <tr>
@@ -142,6 +142,7 @@ function Line({ cell, columns, index, selected, onSelect, onOpen, onLog }) {
       return html`<td key=${column.name} class=${column.numeric ? "numeric" : ""} title=${column.numeric ? null : text}>${text}</td>`;
     })}
     <td class="table-actions">
+      <button class="link" disabled=${cell.had === 0} onClick=${() => onOpen(cell)} aria-label=${`Picture of row ${index - 1}`}>view</button>
       <button class="link" onClick=${(/** @type {Event} */ event) => (event.stopPropagation(), onLog(cell))} aria-label=${`Log of row ${index - 1}`}>log</button>
     </td>
   </tr>`;

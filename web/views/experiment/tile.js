@@ -81,7 +81,7 @@ function Caption(props) {
         : html`<span class="muted">${cell.had > 0 ? "not measured yet" : " "}</span>`}
     </p>
     <p class="tile-notes">
-      ${ratio !== null && html`<span class="number" title=${`error relative to ${baseline}`}>${ratio === 1 ? "baseline" : `× ${ratio.toPrecision(3)}`}</span>`}
+      ${ratio !== null && html`<span class="number" title=${`error relative to ${baseline}, at the samples that each rendered`}>${ratio === 1 ? "baseline" : `× ${ratio.toPrecision(3)}`}</span>`}
       ${cell.spp !== cell.spp_actual &&
       html`<span class="number tile-rounded" title=${`${cell.spp} spp were asked; ${cell.sampler} rounds them`}>${cell.spp_actual} spp</span>`}
       <${State} ...${props} />
@@ -126,6 +126,6 @@ function titleOf({ cell }) {
 /** @param {import("./compare.js").Rank} rank @param {"row" | "column" | null} along */
 function rankText(rank, along) {
   return rank === "best"
-    ? `lowest error of the ${along}, among cells with the same reference`
+    ? `lowest error of the ${along}, among cells with the same reference and as many samples`
     : `less than 2 standard errors from the lowest of the ${along}: they cannot be told apart`;
 }
