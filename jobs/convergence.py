@@ -23,6 +23,8 @@ class Series:
     One curve. Points have the names of ``Point`` on the wire.
 
     alike  all its renders were timed under the conditions that most of the experiment's were
+    floor  what an exact picture would measure: the reference's own noise. None where the metric has none, or where it
+           is not measured yet
     """
 
     scene: str
@@ -32,6 +34,7 @@ class Series:
     points: list[Row] = field(default_factory=list)
     slope: Slope | None = None
     alike: bool = True
+    floor: float | None = None
 
 
 def curves(store: Store, experiment: int, metric: str, scene: str | None = None) -> list[Series]:
@@ -42,12 +45,19 @@ def curves(store: Store, experiment: int, metric: str, scene: str | None = None)
     if metric not in METRICS:
         raise UnknownName("metric", metric, "", METRICS)
     version = json.dumps({metric: METRICS[metric].version})
+    floors = {
+        row["reference"]: row["value"]
+        for row in store.rows(
+            "floors_of_experiment", experiment_id=experiment, name=metric, version=METRICS[metric].version
+        )
+    }
     found: dict[tuple[Any, ...], Series] = {}
     conditions: dict[tuple[Any, ...], set[str]] = {}
     for row in store.stream("points", experiment_id=experiment, versions=version, scene=scene):
         key = (row["scene"], row["integrator"], row["sampler"], row["sweep"])
         if key not in found:
-            found[key] = Series(*key[:3], sweep=json.loads(row["sweep"]) if row["sweep"] else {})
+            sweep = json.loads(row["sweep"]) if row["sweep"] else {}
+            found[key] = Series(*key[:3], sweep=sweep, floor=floors.get(row["reference"]))
             conditions[key] = set()
         found[key].points.append(_point(row))
         if row["conditions"]:
@@ -55,7 +65,8 @@ def curves(store: Store, experiment: int, metric: str, scene: str | None = None)
     usual = Counter(text for texts in conditions.values() for text in texts).most_common(1)
     for key, series in found.items():
         series.alike = conditions[key] <= {usual[0][0]} if usual else True
-        series.slope = slope(series.points)
+        if METRICS[metric].lower_is_better is not None:  # a brightness falls towards nothing
+            series.slope = slope(series.points)
     return list(found.values())
 
 

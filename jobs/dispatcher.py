@@ -18,8 +18,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from jobs import experiments, inbox, points, queue
+from jobs import disk, experiments, inbox, points, queue
 from jobs.artifacts import Artifacts
+from jobs.executors import base
 from jobs.executors.base import Done, Event, Executor, Failed, Finished, Order, Passed, Released, Started
 from jobs.experiments import Experiment
 from jobs.measure import Measurer
@@ -184,6 +185,8 @@ class Dispatcher:
                 self._keep(work, event)
             case Done():
                 kind, state = "done", queue.finish(self.store, work)
+            case Failed(error_class=base.DISK_FULL):
+                raise disk.full(self.artifacts.data)  # the cell is not to blame; the next owner queues it again
             case Failed():
                 kept = self.artifacts.write_log(work.attempt_id, event.log)
                 state = queue.fail(self.store, work, event.error_class, event.message, kept)

@@ -27,9 +27,10 @@ from jobs.points import VERSIONS
 from jobs.store import Row, Store, now
 from renderer.errors import DartboardError
 from renderer.images import read_picture
-from renderer.metrics import METRICS, Reference, measure, nonfinite
+from renderer.metrics import METRICS, Reference, floors, measure, nonfinite
 
 KEPT_BYTES = 256 * 2**20  # of references in memory; a grid works on one scene at a time
+FLOOR_VERSIONS = json.dumps({name: metric.version for name, metric in METRICS.items() if metric.floor})
 PAGE = 200  # cells that are looked through for gaps at a time, some milliseconds
 
 log = logging.getLogger("dartboard")
@@ -43,16 +44,20 @@ class Measurer:
         self.pairs: deque[Row] = deque()
         self.searches: deque[tuple[int, int]] = deque()  # (reference, last cell that was looked at)
         self.references: OrderedDict[tuple[int, int], Reference] = OrderedDict()
+        self.unfloored: deque[tuple[int, int]] = deque()  # references whose own noise is not measured
 
     def look_for_gaps(self) -> None:
         """Everything in the data directory that lacks a metric: after a start, or a new version of a formula."""
         points.fill_gaps(self.store)
-        self.searches.extend((row["reference_id"], 0) for row in self.store.rows("reference_ids"))
+        references = [row["reference_id"] for row in self.store.rows("reference_ids")]
+        self.searches.extend((reference, 0) for reference in references)
+        self._look_for_floors(references)
 
     def look_into(self, experiment: int) -> None:
         """What an experiment shares with others and nobody has measured against its references."""
         rows = self.store.rows("references_of_experiment", experiment_id=experiment)
         self.searches.extend((row["reference_id"], 0) for row in rows)
+        self._look_for_floors([row["reference_id"] for row in rows])
 
     def add(self, replicate_id: int) -> None:
         """A replicate was just committed: it can be measured, or it completes a reference."""
@@ -62,6 +67,7 @@ class Measurer:
             self.pairs.extend(self.store.rows("pairs_of_replicate", replicate_id=replicate_id))
         elif self.store.value("completes_reference", cell_id=replicate["cell_id"], k=replicate["k"]):
             self.searches.append((replicate["cell_id"], 0))
+            self._look_for_floors([replicate["cell_id"]])
 
     def step(self, seconds: float) -> bool:
         """Search or measure for about ``seconds``, and get on in any case; True if there may be more."""
@@ -70,10 +76,35 @@ class Measurer:
             self._search()
             if time.monotonic() >= end:
                 break
+        if self.unfloored:
+            self._measure_floor(*self.unfloored.popleft())
         if self.pairs:
             with self.store.transaction():
                 self._measure_until(end)
-        return bool(self.pairs or self.searches)
+        return bool(self.pairs or self.searches or self.unfloored)
+
+    def _look_for_floors(self, references: Sequence[int]) -> None:
+        """Those of these references whose own noise is not measured."""
+        rows = self.store.rows("without_floors", cells=json.dumps(references), versions=FLOOR_VERSIONS)
+        self.unfloored.extend((row["reference_id"], row["reference_replicates"]) for row in rows)
+
+    def _measure_floor(self, cell_id: int, replicates: int) -> None:
+        """What an exact picture would measure against a reference. One that is not finite has no floor."""
+        try:
+            found = floors(self._reference(cell_id, replicates))
+        except DartboardError as error:
+            log.warning("the noise of reference %s is not measured: %s", cell_id, error)
+            return
+        rows = [
+            {
+                "reference_id": cell_id, "reference_replicates": replicates, "name": name,
+                "version": METRICS[name].version, "value": value,
+            }
+            for name, value in found.items()
+            if math.isfinite(value)
+        ]  # fmt: skip
+        with self.store.transaction():
+            self.store.run_many("add_floor", rows)
 
     def _search(self) -> None:
         """One page of the cells of one reference."""

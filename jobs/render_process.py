@@ -15,6 +15,7 @@ Events:    ready · started · pass · replicate (a finished picture, "file" in 
 from __future__ import annotations
 
 import ctypes
+import errno
 import gc
 import json
 import os
@@ -25,6 +26,8 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 from typing import IO, Any
+
+from jobs.executors.base import DISK_FULL
 
 PASS_EVENT_SECONDS = 0.1  # between two progress events of one replicate
 PREVIEW_SECONDS = 0.5  # between two previews, and before the first: quick cells need none
@@ -172,6 +175,8 @@ def explain(error: Exception) -> tuple[str, str]:
         return error.error_class, text
     if isinstance(error, MemoryError) or "out of memory" in text.lower() or "bad_alloc" in text:
         return "out_of_memory", "not enough memory for one pass; ask for a smaller resolution or crop"
+    if any(os.strerror(number) in text for number in (errno.ENOSPC, errno.EDQUOT)):  # OpenEXR tells it in words only
+        return DISK_FULL, text
     return "crash", f"{type(error).__name__}: {text.splitlines()[0]}"
 
 

@@ -63,7 +63,7 @@ def _purge(store: Store, artifacts: Artifacts, experiment: int) -> None:
     # Deleting a row makes SQLite look for its children, table by table and row by row: minutes for a large grid. Here
     # the children go first, a table at a time.
     with store.without_foreign_keys(), store.transaction():
-        for step in ("purge_metrics", "purge_replicates", "purge_attempts"):
+        for step in ("purge_metrics", "purge_floors", "purge_replicates", "purge_attempts"):
             store.run(step, cells=cells)
         store.run("purge_events", cells=cells, experiment_id=experiment)
         for step in ("purge_points", "purge_submissions", "purge_wanted"):

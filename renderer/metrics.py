@@ -44,6 +44,8 @@ class Metric:
     epsilon          the regulariser in the formula, 0 where there is none
     lower_is_better  None where neither direction is better
     needs_halves     True if two independent halves are required
+    floor            reference → what an exact picture would measure against it, from the difference of its halves; None
+                     for metrics that the reference's noise does not raise
     """
 
     name: str
@@ -54,6 +56,7 @@ class Metric:
     epsilon: float = 0.0
     lower_is_better: bool | None = True
     needs_halves: bool = False
+    floor: Callable[[Reference], float] | None = None
 
     def value(self, picture: Picture, reference: Reference) -> float:
         """The mean of the map, in float64. NaN and infinities in the pictures show in the value."""
@@ -75,6 +78,20 @@ def _relmse(picture: Picture, reference: Reference) -> Picture:
     return (picture - mean) ** 2 / (mean**2 + RELMSE_EPSILON)
 
 
+def _noise(reference: Reference) -> Picture:
+    """The variance of mean(R1, R2), pixel by pixel: (R1 − R2)² / 4 has it as its expectation."""
+    assert reference.second is not None, "noise needs two halves"
+    return (reference.first.astype(np.float64) - reference.second) ** 2 / 4
+
+
+def _mse_floor(reference: Reference) -> float:
+    return float(np.mean(_noise(reference)))
+
+
+def _relmse_floor(reference: Reference) -> float:
+    return float(np.mean(_noise(reference) / (reference.mean**2 + RELMSE_EPSILON)))
+
+
 def _mean_ratio(picture: Picture, reference: Reference) -> Picture:
     # The map is I / mean(R): flat where a picture is right, and its mean is the ratio of the two means.
     scale = float(np.mean(reference.mean))
@@ -85,12 +102,13 @@ METRICS: dict[str, Metric] = {
     metric.name: metric
     for metric in (
         Metric("mse", 1, "mean((I − R)²), R = mean(R1, R2)", _mse,
-               "plain mean squared error; includes the reference's noise"),
+               "plain mean squared error; includes the reference's noise", floor=_mse_floor),
         Metric("mse_cross", 1, "mean((I − R1)·(I − R2))", _mse_cross,
                "unbiased for bias² + variance: no floor from the reference; may be negative when tiny",
                needs_halves=True),
         Metric("relmse", 1, "mean((I − R)² / (R² + ε)), ε = 0.01", _relmse,
-               "squared error relative to the reference: a visible lamp does not rule it", RELMSE_EPSILON),
+               "squared error relative to the reference: a visible lamp does not rule it", RELMSE_EPSILON,
+               floor=_relmse_floor),
         Metric("mean_ratio", 1, "mean(I) / mean(R)", _mean_ratio,
                "brightness against the reference: far from 1 is a bias, whatever the other errors say",
                lower_is_better=None),
@@ -112,6 +130,13 @@ def measure(picture: Picture, reference: Reference) -> dict[str, float]:
         for name, metric in METRICS.items()
         if reference.second is not None or not metric.needs_halves
     }
+
+
+def floors(reference: Reference) -> dict[str, float]:
+    """The noise floor of every metric that has one, by name; empty for a reference without halves."""
+    if reference.second is None:
+        return {}
+    return {name: metric.floor(reference) for name, metric in METRICS.items() if metric.floor}
 
 
 def nonfinite(picture: Picture) -> int:

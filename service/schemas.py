@@ -255,7 +255,10 @@ class Slope(Wire):
 
 
 class Series(Wire):
-    """One curve. ``alike``: all its renders were timed under the same conditions, so its seconds may be compared."""
+    """
+    One curve. ``alike``: all its renders were timed under the same conditions, so its seconds may be compared.
+    ``floor``: what an exact picture would measure, the noise of the reference; a mean near it says little.
+    """
 
     scene: str
     integrator: str
@@ -264,6 +267,7 @@ class Series(Wire):
     points: list[Point]
     slope: Slope | None
     alike: bool
+    floor: float | None = None
 
 
 class Convergence(Wire):

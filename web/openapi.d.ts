@@ -433,7 +433,8 @@ export interface paths {
         };
         /**
          * List Scenes
-         * @description The built-in scenes with what their files say about size, integrator and sampler.
+         * @description The built-in scenes, then those that clients have brought, newest first, with what their files say about size,
+         *     integrator and sampler.
          */
         get: operations["list_scenes_api_scenes_get"];
         put?: never;
@@ -941,6 +942,7 @@ export interface components {
         /**
          * Series
          * @description One curve. ``alike``: all its renders were timed under the same conditions, so its seconds may be compared.
+         *     ``floor``: what an exact picture would measure, the noise of the reference; a mean near it says little.
          */
         Series: {
             /** Scene */
@@ -961,6 +963,8 @@ export interface components {
             slope: components["schemas"]["Slope"] | null;
             /** Alike */
             alike: boolean;
+            /** Floor */
+            floor?: number | null;
         };
         /**
          * Slope

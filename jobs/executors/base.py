@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+DISK_FULL = "disk_full"  # an error class that blames no cell: there was no space for its picture
+
 
 @dataclass(frozen=True)
 class Order:
@@ -83,7 +85,10 @@ class Done:
 
 @dataclass(frozen=True)
 class Failed:
-    """The order ended without all its replicates; ``error_class`` is one of the queue's, ``log`` the process's tail."""
+    """
+    The order ended without all its replicates; ``error_class`` is one of the queue's, or DISK_FULL, ``log`` the tail
+    of its process's.
+    """
 
     order: int
     error_class: str

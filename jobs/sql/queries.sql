@@ -266,6 +266,9 @@ delete from metric
 where reference_id in (select value from json_each(:cells))
     or replicate_id in (select id from replicate where cell_id in (select value from json_each(:cells)));
 
+-- name: purge_floors
+delete from floor where reference_id in (select value from json_each(:cells));
+
 -- name: purge_replicates
 delete from replicate where cell_id in (select value from json_each(:cells));
 
@@ -342,8 +345,8 @@ select distinct name from point where experiment_id = :experiment_id;
 -- name: points
 -- One row per cell and metric, in the order of the plan, with the mean time where it is known.
 select
-    wanted.position, wanted.cell_id as cell, wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp,
-    cell.spp as spp_actual, case when instr(cell.spec, '"sweep":{}') = 0 then cell.spec ->> '$.estimand.sweep' end as sweep,
+    wanted.position, wanted.cell_id as cell, wanted.reference_id as reference,
+    wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp, cell.spp as spp_actual, case when instr(cell.spec, '"sweep":{}') = 0 then cell.spec ->> '$.estimand.sweep' end as sweep,
     point.name, point.n, point.mean, point.error, seconds.mean as seconds, seconds.conditions
 from experiment_cell as wanted
 cross join cell on cell.id = wanted.cell_id
@@ -520,6 +523,29 @@ select exists (
 
 -- name: reference_images
 select image from replicate where cell_id = :cell_id and role = 'reference' and k < :replicates order by k;
+
+-- name: without_floors
+-- Of these cells, the complete references with halves, whose floor is not known by the current formulas.
+select distinct wanted.cell_id as reference_id, wanted.replicates as reference_replicates
+from json_each(:cells) as given cross join experiment_cell as wanted on wanted.cell_id = given.value
+where wanted.role = 'reference' and wanted.had = wanted.replicates and wanted.replicates > 1 and exists (
+    select 1 from json_each(:versions) as formula
+    where not exists (
+        select 1 from floor
+        where floor.reference_id = wanted.cell_id and floor.reference_replicates = wanted.replicates
+            and floor.name = formula.key and floor.version = formula.value))
+order by reference_id, reference_replicates;
+
+-- name: add_floor
+insert or replace into floor (reference_id, reference_replicates, name, version, value)
+values (:reference_id, :reference_replicates, :name, :version, :value);
+
+-- name: floors_of_experiment
+select floor.reference_id as reference, floor.value
+from experiment_cell as wanted
+join floor on floor.reference_id = wanted.cell_id and floor.reference_replicates = wanted.replicates
+where wanted.experiment_id = :experiment_id and wanted.role = 'reference' and floor.name = :name
+    and floor.version = :version;
 
 -- name: add_metric
 insert or replace into metric (replicate_id, reference_id, reference_replicates, name, version, value, reason)

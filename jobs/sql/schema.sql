@@ -142,6 +142,16 @@ create table point (
     primary key (experiment_id, position, name)
 ) strict, without rowid;
 
+-- What an exact picture would measure: the part of a metric that is the reference's own noise.
+create table floor (
+    reference_id         integer not null references cell (id),
+    reference_replicates integer not null check (reference_replicates > 0),
+    name                 text not null,
+    version              integer not null,               -- of the formula
+    value                real not null check (value >= 0),
+    primary key (reference_id, reference_replicates, name)
+) strict, without rowid;
+
 -- What happened, in order; its last revision is the store's.
 create table event (
     revision      integer primary key autoincrement,

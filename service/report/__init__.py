@@ -31,6 +31,7 @@ POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-s
 # From a server: in an origin of its own, so that no script in it can speak for the reader to the server.
 SERVED_POLICY = f"sandbox allow-scripts allow-downloads; frame-ancestors 'none'; {POLICY}"
 STYLES = ("report", "figures", "paper")
+PLOTS = ("plan.js", "convergence.js")  # the dashboard's own drawing, in the order in which they need each other
 
 
 def render_report(store: Store, artifacts: Artifacts, experiment_id: int) -> str:
@@ -70,6 +71,6 @@ def _template() -> Any:
         "policy": POLICY, "sentences": verdicts.sentences, "icon": inline.icon(),
         "css": inline.style(*(inline.HERE / f"{name}.css" for name in STYLES)),
         "plotly": inline.library(inline.WEB / "vendor" / "plotly-basic.min.js"),
-        "script": inline.script(inline.WEB / "plots" / "convergence.js", inline.HERE / "report.js"),
+        "script": inline.script(*(inline.WEB / "plots" / name for name in PLOTS), inline.HERE / "report.js"),
     }  # fmt: skip
     return environment.get_template("report.html")

@@ -5,7 +5,8 @@
  * Everything is drawn from the JSON in the page; nothing is fetched. On paper the plots are redrawn for a white page of
  * its width, without controls.
  */
-import { layout, styleOf, traces, unplottable } from "../../web/plots/convergence.js";
+import { layout, traces, unplottable } from "../../web/plots/convergence.js";
+import { styleOf } from "../../web/plots/plan.js";
 
 /** @typedef {import("../../web/api.js").Convergence} Convergence */
 /** @typedef {{scene: string, integrators: string[], sweep: Record<string, unknown>}} Panel */
@@ -57,7 +58,7 @@ class Plot {
     const { scene, integrators } = this.panel;
     const sweep = JSON.stringify(this.panel.sweep);
     const width = printing ? PAPER_WIDTH : this.target.clientWidth;
-    /** @type {import("../../web/plots/convergence.js").Options} */
+    /** @type {import("../../web/plots/plan.js").Options} */
     const options = {
       x: this.x,
       arrange: this.arrange,

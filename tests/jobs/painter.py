@@ -93,7 +93,7 @@ class Painter:
         if not drawing.started:
             drawing.started = True
             self.happened.append(Started(order.order))
-        elif self.allowed <= 0:
+        elif drawing.left and self.allowed <= 0:
             return
         elif drawing.left:
             role, k = drawing.left.popleft()

@@ -5,6 +5,7 @@ first tests have a real render process: one bad cell costs the grid that cell an
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 from collections.abc import Iterator
@@ -16,11 +17,14 @@ import pytest
 from jobs import experiments, grid, plan, points, queue, results
 from jobs.artifacts import Artifacts
 from jobs.dispatcher import Dispatcher, News
-from jobs.executors.base import Started
+from jobs.errors import DataDirectoryProblem
+from jobs.executors.base import DISK_FULL, Event, Failed, Started
 from jobs.executors.local import LocalExecutor
 from jobs.queue import MAX_ATTEMPTS
+from jobs.render_process import explain
 from jobs.store import Store
 from renderer import devices
+from renderer.errors import SceneError
 from renderer.scenes import sources
 from tests.jobs.conftest import assert_sound, planned, select, submit
 from tests.jobs.painter import Painter
@@ -107,6 +111,49 @@ def test_a_picture_and_its_points_are_recorded_together(
     with pytest.raises(KeyboardInterrupt):
         painted(store, artifacts).run()
     assert select(store, "select count(*) from replicate") == [(0,)]
+
+
+class Full(Painter):
+    """Has no space for its second picture."""
+
+    def events(self, timeout: float) -> list[Event]:
+        if len(self.drawn) == 1 and self.held:
+            return [Failed(self.held.popleft().order.order, DISK_FULL, "No space left on device", "")]
+        return super().events(timeout)
+
+
+def test_a_full_disk_is_no_fault_of_a_cell(store: Store, artifacts: Artifacts) -> None:
+    """Not once, and not three times: the run ends with the reason, and the next one draws what is missing."""
+    experiment = submit(store, spp=[1, 2])
+    painter = Full()
+    for _ in range(MAX_ATTEMPTS + 1):
+        with pytest.raises(DataDirectoryProblem, match="is full; free some space and run again"):
+            painted(store, artifacts, painter).run()
+        queue.recover(store)
+        painter.held.clear()
+    assert select(store, "select distinct state, crashes, error_class from cell") == [("queued", 0, None)]
+    again = Painter()
+    painted(store, artifacts, again).run()
+    assert experiments.standing(store, experiment.id).state == "done"
+    assert not set(painter.drawn) & set(again.drawn)
+
+
+@pytest.mark.parametrize(
+    ("error", "error_class"),
+    [
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), DISK_FULL),
+        (OSError(errno.EDQUOT, os.strerror(errno.EDQUOT)), DISK_FULL),
+        (RuntimeError('Failed to write pixel data to image file "x.exr". No space left on device.'), DISK_FULL),
+        (RuntimeError("jit_var_eval(): out of memory!"), "out_of_memory"),
+        (MemoryError(), "out_of_memory"),
+        (SceneError("no such mesh"), "scene_error"),
+        (ZeroDivisionError("division by zero"), "crash"),
+    ],
+)
+def test_an_error_of_a_render_process_has_its_class(error: Exception, error_class: str) -> None:
+    found, sentence = explain(error)
+    assert found == error_class
+    assert sentence and "\n" not in sentence
 
 
 def test_what_another_experiment_had_already_is_measured_for_a_new_one(store: Store, artifacts: Artifacts) -> None:

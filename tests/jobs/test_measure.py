@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from jobs import experiments, measure, queue
+from jobs import convergence, experiments, measure, queue
 from jobs.artifacts import Artifacts
 from jobs.measure import Measurer
 from jobs.plan import Plan
 from jobs.store import Store
-from renderer.metrics import METRICS, Reference
+from renderer.metrics import METRICS, Reference, floors
 from renderer.metrics import measure as measure_pictures
 from tests.jobs.conftest import SIZE, claim, draw, picture, planned, select, submit
 
@@ -238,3 +238,23 @@ def test_few_references_stay_in_memory(store, artifacts, monkeypatch):
     finish_all(measurer)
     assert len(numbers(store)) == 6 * len(METRICS)
     assert len(measurer.references) == 3
+
+
+def test_every_reference_gets_its_noise_floor_whoever_finds_it(store, artifacts):
+    """While pictures come, and by the next owner where an older version had measured without floors."""
+    experiment = submit(store, reference={"spp": 64, "replicates": 4})
+    measurer = Measurer(store, artifacts)
+    draw_all(store, artifacts, measurer)
+    finish_all(measurer)
+    ((digest,),) = select(store, "select digest from cell join floor on reference_id = cell.id group by digest")
+    halves = [
+        np.mean([picture(digest, "reference", k) for k in half], axis=0, dtype=float) for half in ((0, 2), (1, 3))
+    ]
+    expected = floors(Reference(*halves))
+    for again in (False, True):
+        if again:
+            store.connection.execute("delete from floor")
+            measure.catch_up(store, artifacts)
+        for name, value in expected.items():
+            assert [one.floor for one in convergence.curves(store, experiment.id, name)] == [pytest.approx(value)]
+        assert convergence.curves(store, experiment.id, "mse_cross")[0].floor is None

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from renderer.metrics import METRICS, RELMSE_EPSILON, Reference, measure, nonfinite, shape
+from renderer.metrics import METRICS, RELMSE_EPSILON, Reference, floors, measure, nonfinite, shape
 
 radiance = st.floats(0, 1e4, width=32)
 pictures = arrays.arrays(np.float32, (3, 4, 3), elements=radiance)
@@ -95,6 +95,24 @@ def test_cross_error_is_unbiased_and_plain_error_is_not():
         z = (np.mean(values) - expected[name]) / error
         assert abs(z) < 3.3, f"{name}: mean {np.mean(values):.5f}, expected {expected[name]:.5f}, z = {z:.1f}"
     assert np.mean(found["mse_cross"]) < expected["mse"] - 5 * np.std(found["mse"]) / np.sqrt(seeds)
+
+
+def test_the_floor_is_what_an_exact_picture_measures():
+    """z-test over 400 noisy references of one truth: a metric of the truth and its floor have the same mean."""
+    rng = np.random.default_rng(11)
+    truth = rng.gamma(2.0, 0.5, (16, 16, 3)).astype(np.float32)
+    differences: dict[str, list[float]] = {}
+    for _ in range(400):
+        reference = Reference(*(truth + rng.normal(0, 0.02, truth.shape).astype(np.float32) for _ in "ab"))
+        exact = measure(truth, reference)
+        for name, floor in floors(reference).items():
+            differences.setdefault(name, []).append(exact[name] - floor)
+            assert 0.5 * exact[name] < floor < 2 * exact[name]
+    assert set(differences) == {"mse", "relmse"}
+    for name, found in differences.items():
+        z = np.mean(found) / (np.std(found, ddof=1) / np.sqrt(len(found)))
+        assert abs(z) < 3.3, f"{name}: z = {z:.1f}"
+    assert floors(Reference(truth)) == {}
 
 
 def test_sums_are_kept_in_double_precision():

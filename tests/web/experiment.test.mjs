@@ -369,7 +369,23 @@ test("a name is text, not markup, and no data draw an empty plot", () => {
   }
 });
 
-test("the plot's module imports nothing at run time: the report inlines it", () => {
-  const source = readFileSync(new URL("../../web/plots/convergence.js", import.meta.url), "utf8");
-  assert.ok(!/^\s*import\b/m.test(source));
+test("the plot's modules import only each other at run time: the report inlines them", () => {
+  for (const file of ["plan.js", "convergence.js"]) {
+    const source = readFileSync(new URL(`../../web/plots/${file}`, import.meta.url), "utf8");
+    for (const [, from] of source.matchAll(/^\s*import\b[^"]*"([^"]*)"/gm)) assert.equal(from, "./plan.js");
+  }
+});
+
+test("a point that is mostly the reference's noise is hollow, and the noise is shaded", () => {
+  const noisy = convergence(RELMSE, (series) => ({ ...series, floor: 0.05 }));
+  for (const { marker } of curves(traces(noisy))) {
+    const open = marker.symbol.map((symbol) => symbol.endsWith("-open"));
+    assert.deepEqual(open, [false, false, true]); // means 1/4, 1/9 and 1/16
+  }
+  const [shade, ...more] = layout(noisy).shapes;
+  assert.equal(more.length, 0);
+  assert.equal(shade.y1, 0.05);
+  assert.ok(shade.y0 < 0.05);
+  const clean = convergence(RELMSE, (series) => ({ ...series, floor: 1e-9 }));
+  assert.deepEqual(layout(clean).shapes, []);
 });

@@ -3,61 +3,22 @@
  * A metric against samples per pixel or seconds: one curve per integrator × sampler, with its 95 % band.
  *
  * Both axes are logarithmic: independent samples fall with slope −1 in a mean squared error, and a better point set
- * shows as a steeper line. Colour tells samplers apart; dash and marker tell integrators apart. In small multiples every
- * panel repeats all curves in grey, so that each is read against the rest. Points lie at the spp that was rendered.
+ * shows as a steeper line. In small multiples every panel repeats all curves in grey, so that each is read against the
+ * rest. Points lie at the spp that was rendered; a point in the reference's own noise is hollow.
  *
- * Pure, and without any import at run time: the exported report inlines this very file.
+ * Pure; the exported report inlines this very file and `plan.js`.
  */
+import { chosen, isLog, isNoise, planOf, xOf } from "./plan.js";
+
 /** @typedef {import("../api.js").Convergence} Convergence */
 /** @typedef {import("../api.js").Series} Series */
 /** @typedef {import("../api.js").Point} Point */
-/**
- * @typedef {object} Options
- * @property {"spp" | "seconds"} [x] default "spp"
- * @property {"overlay" | "multiples"} [arrange] default "overlay"; in multiples rows are samplers, columns integrators
- * @property {string} [scene] only this scene; needed where the convergence holds several
- * @property {(series: Series) => boolean} [only] which curves to draw
- * @property {boolean} [band] the 95 % interval over replicates; default true
- * @property {boolean} [slopes] faint lines of slope −1, −1.5 and −2; default true
- * @property {boolean} [legend] Plotly's own legend, with slopes; default true, never in multiples
- * @property {boolean} [dark] default false
- * @property {number} [width] px that the plot has; decides how many panels stand side by side
- * @property {readonly string[]} [samplers] every sampler in the grid's order, which fixes the colours
- * @property {readonly string[]} [integrators] every integrator in the grid's order, which fixes dash and marker
- * @property {number} [selected] the `cell` of a point to mark
- * @property {{sampler?: string, integrator?: string}} [emphasis] curves that are not of these step back
- * @property {string} [font] font family
- */
-/** @typedef {{series: Series, points: Point[], colour: string, dash: string, symbol: string, fair: boolean}} Curve */
-/** @typedef {{title: string, row: number, column: number, curves: Curve[]}} Panel */
-/** @typedef {{text: string, muted: string, line: string, context: string}} Ink */
-/**
- * What both halves of a figure are made from. Ranges are as Plotly wants them: logarithms to base 10 on log axes.
- * @typedef {object} Plan
- * @property {Curve[]} curves
- * @property {Panel[]} panels
- * @property {readonly string[]} heads over the columns of panels: integrators, or nothing
- * @property {number} rows
- * @property {number} columns
- * @property {boolean} log whether errors have a logarithmic axis
- * @property {[number, number]} x
- * @property {[number, number]} y
- * @property {{slope: number, x: [number, number], y: [number, number], cut: boolean}[]} guides
- * @property {Ink} ink
- */
-
-/** Ten colours that differ in lightness as well as hue, 3:1 or more against their background. */
-export const PALETTE = {
-  dark: ["#8fb8ff", "#ffb454", "#4fd1a5", "#f48fb1", "#e3d26f", "#b79cff", "#ff7f66", "#6fdcf0", "#b9c0cc", "#a8d84e"],
-  light: ["#1f63c9", "#b35900", "#007a57", "#b8246b", "#7d6a00", "#6f3bd1", "#c0341d", "#00788c", "#59616e", "#4c7a00"],
-};
-export const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
-export const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "x", "pentagon"];
-/** What a mean squared error may fall with: independent samples, and better point sets on smooth pictures. */
-export const GUIDES = [-1, -1.5, -2];
+/** @typedef {import("./plan.js").Options} Options */
+/** @typedef {import("./plan.js").Curve} Curve */
+/** @typedef {import("./plan.js").Panel} Panel */
+/** @typedef {import("./plan.js").Plan} Plan */
 
 const MARKED = 40; // curves: with more, markers are a blur and take most of the time to draw
-const PANEL_WIDTH = 230; // px: below, the labels of two ticks meet
 const PANEL_HEIGHT = 190; // px
 const OVERLAY_HEIGHT = 430; // px
 const COLUMN_GAP = 0.03; // of the plot's width
@@ -66,11 +27,6 @@ const LEFT = 66; // px: numbers and title of the error axis
 const RIGHT = 26; // px: the labels of the guides
 const LETTER = 6.6; // px: a letter of a panel's title, on average
 const TICK = 34; // px: between the middles of two labels of the axis of samples
-/** @type {{dark: Ink, light: Ink}} */
-const INK = {
-  dark: { text: "#d8dce4", muted: "#98a1b0", line: "#333a47", context: "rgba(152,161,176,0.3)" },
-  light: { text: "#1c2330", muted: "#5b6575", line: "#d9dee6", context: "rgba(91,101,117,0.28)" },
-};
 
 /** Plotly's traces: guides and bands first, so that curves lie above them. @param {Convergence} convergence @param {Options} [options] @returns {Plotly.Data[]} */
 export function traces(convergence, options = {}) {
@@ -104,8 +60,8 @@ export function layout(convergence, options = {}) {
     legend: { orientation: "h", x: 0, y: -0.16, yanchor: "top", tracegroupgap: 4 },
     // A zoom outlives new data, and ends when another quantity is drawn.
     uirevision: [convergence.metric.name, options.x, options.arrange, options.scene].join(" "),
-    annotations: multiples ? panelTexts(plan, convergence, options) : guideLabels(plan),
-    shapes: convergence.metric.name === "mean_ratio" ? plan.panels.map((panel) => unity(panel, plan)) : [],
+    annotations: multiples ? panelTexts(plan, convergence, options) : [...guideLabels(plan), ...floorLabel(plan)],
+    shapes: plan.log ? plan.panels.flatMap((panel) => floors(panel, plan)) : plan.panels.map((panel) => unity(panel, plan)),
   };
   for (let column = 0; column < plan.columns; column++) {
     made[axisKey("x", column)] = {
@@ -137,105 +93,9 @@ export function unplottable(convergence, options = {}) {
   return points.filter((point) => point.mean <= 0).length;
 }
 
-/** Colour, dash and marker of a curve, the same in every scene. @param {{sampler: string, integrator: string}} of @param {Options} options */
-export function styleOf(of, options) {
-  const colours = PALETTE[options.dark ? "dark" : "light"];
-  const sampler = Math.max(0, options.samplers?.indexOf(of.sampler) ?? 0);
-  const integrator = Math.max(0, options.integrators?.indexOf(of.integrator) ?? 0);
-  return {
-    colour: /** @type {string} */ (colours[sampler % colours.length]),
-    dash: /** @type {string} */ (DASHES[integrator % DASHES.length]),
-    symbol: /** @type {string} */ (SYMBOLS[integrator % SYMBOLS.length]),
-  };
-}
-
 /** "−1.15 ± 0.02", half of the 95 % interval; empty where there is no fit. @param {Series["slope"]} slope */
 export function slopeText(slope) {
   return slope ? `${minus(slope.value.toFixed(2))} ± ${((slope.high - slope.low) / 2).toFixed(2)}` : "";
-}
-
-/** @param {Convergence} convergence */
-function isLog(convergence) {
-  return convergence.metric.lower_is_better !== null;
-}
-
-/** @param {Convergence} convergence @param {Options} options */
-function chosen(convergence, options) {
-  return convergence.series.filter(
-    (series) => (options.scene === undefined || series.scene === options.scene) && (options.only?.(series) ?? true),
-  );
-}
-
-/** @param {Convergence} convergence @param {Options} options @returns {Plan} */
-function planOf(convergence, options) {
-  const log = isLog(convergence);
-  const samplers = options.samplers ?? [...new Set(convergence.series.map((series) => series.sampler))];
-  const integrators = options.integrators ?? [...new Set(convergence.series.map((series) => series.integrator))];
-  const curves = chosen(convergence, options).map((series) => ({
-    series,
-    ...styleOf(series, { ...options, samplers, integrators }),
-    fair: series.alike || options.x !== "seconds",
-    points: series.points.filter((point) => xOf(point, options) > 0 && (point.mean > 0 || !log)),
-  }));
-  const grid = options.arrange === "multiples" && curves.length ? panelsOf(curves, options) : overlay(curves);
-  const ranges = rangesOf(curves, log, options);
-  const ink = INK[options.dark ? "dark" : "light"];
-  return { curves, log, ink, ...grid, ...ranges, guides: log && options.slopes !== false ? guidesIn(curves, ranges, options) : [] };
-}
-
-/** @param {Curve[]} curves */
-function overlay(curves) {
-  return { rows: 1, columns: 1, heads: [], panels: [{ title: "", row: 0, column: 0, curves }] };
-}
-
-/** Rows of samplers and columns of integrators; with one of either, panels wrap to the width. @param {Curve[]} curves @param {Options} options */
-function panelsOf(curves, options) {
-  const samplers = [...new Set(curves.map((curve) => curve.series.sampler))];
-  const integrators = [...new Set(curves.map((curve) => curve.series.integrator))];
-  const fit = Math.max(1, Math.floor((options.width ?? 900) / PANEL_WIDTH));
-  const matrix = integrators.length > 1 && samplers.length > 1 && integrators.length <= fit;
-  const pairs = samplers.flatMap((sampler) => integrators.map((integrator) => ({ sampler, integrator })));
-  const filled = pairs
-    .map((pair) => ({ ...pair, curves: curves.filter(({ series }) => series.sampler === pair.sampler && series.integrator === pair.integrator) }))
-    .filter((pair) => matrix || pair.curves.length);
-  const columns = matrix ? integrators.length : Math.min(fit, filled.length);
-  const panels = filled.map(({ sampler, integrator, curves: own }, i) => ({
-    title: matrix || integrators.length === 1 ? sampler : samplers.length === 1 ? integrator : `${sampler} · ${integrator}`,
-    row: Math.floor(i / columns),
-    column: i % columns,
-    curves: own,
-  }));
-  return { rows: Math.ceil(filled.length / columns), columns, heads: matrix ? integrators : [], panels };
-}
-
-/** @param {readonly Curve[]} curves @param {boolean} log @param {Options} options @returns {{x: [number, number], y: [number, number]}} */
-function rangesOf(curves, log, options) {
-  const points = curves.flatMap((curve) => curve.points);
-  if (!points.length) return { x: [0, 2], y: log ? [-3, 0] : [0.9, 1.1] };
-  const x = padded(points.map((point) => Math.log10(xOf(point, options))), 0.06, 0.12);
-  if (log) return { x, y: padded(points.map((point) => Math.log10(point.mean)), 0.08, 0.15) };
-  return { x, y: padded([1, ...points.flatMap((point) => [point.low ?? point.mean, point.high ?? point.mean])], 0.08, 0.01) };
-}
-
-/** @param {number[]} values @param {number} part of the span that is added on both sides @param {number} least @returns {[number, number]} */
-function padded(values, part, least) {
-  const [low, high] = [Math.min(...values), Math.max(...values)];
-  const pad = Math.max(least, part * (high - low));
-  return [low - pad, high + pad];
-}
-
-/** Lines of known slope, from above the first points to the last or to the lower edge. @param {readonly Curve[]} curves @param {{y: [number, number]}} ranges @param {Options} options @returns {Plan["guides"]} */
-function guidesIn(curves, ranges, options) {
-  const points = curves.flatMap((curve) => curve.points);
-  const along = points.map((point) => xOf(point, options));
-  const [x0, x1] = [Math.min(...along), Math.max(...along)];
-  if (!(x1 > x0)) return [];
-  const y0 = 1.25 * Math.max(...points.map((point) => point.mean));
-  const floor = 10 ** ranges.y[0];
-  return GUIDES.map((slope) => {
-    const x = Math.min(x1, x0 * (floor / y0) ** (1 / slope));
-    return { slope, x: [x0, x], y: [y0, y0 * (x / x0) ** slope], cut: x < x1 };
-  });
 }
 
 /** @param {Panel} panel @param {Plan} plan @returns {Plotly.Data} */
@@ -283,6 +143,7 @@ function line(curve, panel, convergence, plan, options) {
   const { series, points, fair } = curve;
   const colour = fair ? curve.colour : plan.ink.muted;
   const marked = points.map((point) => point.cell === options.selected);
+  const noise = points.map((point) => plan.log && isNoise(series, point));
   return {
     type: "scatter",
     mode: plan.curves.length > MARKED ? "lines" : "lines+markers",
@@ -299,8 +160,8 @@ function line(curve, panel, convergence, plan, options) {
       color: colour,
       opacity: 1,
       size: marked.map((is) => (is ? 12 : 7)),
-      symbol: curve.symbol,
-      line: { color: plan.ink.text, width: marked.map((is) => (is ? 2 : 0)) },
+      symbol: noise.map((is) => (is ? `${curve.symbol}-open` : curve.symbol)),
+      line: { color: plan.ink.text, width: marked.map((is, i) => (is ? 2 : noise[i] ? 1.5 : 0)) },
     },
   };
 }
@@ -332,6 +193,7 @@ function hover(series, point, convergence, fair) {
     point.spp === point.spp_actual ? `${point.spp} spp` : `${point.spp} spp asked, ${point.spp_actual} rendered`,
     point.seconds === null ? "not timed" : `${point.seconds.toPrecision(3)} s a picture`,
     ...(series.slope && isLog(convergence) ? [`slope ${slopeText(series.slope)}`] : []),
+    ...(isLog(convergence) && isNoise(series, point) ? ["mostly the noise of the reference"] : []),
     ...(fair ? [] : ["timed under different conditions: not comparable"]),
   ].join("<br>");
 }
@@ -426,16 +288,35 @@ function panelTexts(plan, convergence, options) {
   ];
 }
 
+/** What the reference's own noise covers, one area for each reference that reaches into the plot. @param {Panel} panel @param {Plan} plan */
+function floors(panel, plan) {
+  const { xaxis, yaxis } = axesOf(panel);
+  const bottom = 10 ** plan.y[0];
+  return seenFloors(panel.curves, plan).map((floor) => ({
+    type: "rect", xref: `${xaxis} domain`, yref: yaxis, x0: 0, x1: 1, y0: bottom, y1: floor, layer: "below",
+    fillcolor: translucent(plan.ink.muted, 0.14), line: { width: 0 },
+  }));
+}
+
+/** Different noise floors that lie above the lower edge, lowest first. @param {readonly Curve[]} curves @param {Plan} plan @returns {number[]} */
+function seenFloors(curves, plan) {
+  const found = curves.flatMap(({ series: { floor } }) => (floor != null && floor > 10 ** plan.y[0] ? [floor] : []));
+  return [...new Set(found)].sort((a, b) => a - b);
+}
+
+/** @param {Plan} plan */
+function floorLabel(plan) {
+  const highest = seenFloors(plan.curves, plan).at(-1);
+  if (highest === undefined) return [];
+  const place = { xref: "x domain", x: 0.01, xanchor: "left", y: Math.log10(highest), yanchor: "bottom", showarrow: false };
+  return [{ ...place, text: "noise of the reference", font: { size: 11, color: plan.ink.muted } }];
+}
+
 /** The line on which a picture is as bright as its reference. @param {Panel} panel @param {Plan} plan */
 function unity(panel, plan) {
   const { xaxis, yaxis } = axesOf(panel);
   const line = { color: plan.ink.muted, width: 1, dash: "dot" };
   return { type: "line", xref: `${xaxis} domain`, yref: yaxis, x0: 0, x1: 1, y0: 1, y1: 1, line, layer: "below" };
-}
-
-/** @param {Point} point @param {Options} options @returns {number} NaN where it was not timed */
-function xOf(point, options) {
-  return options.x === "seconds" ? point.seconds ?? NaN : point.spp_actual;
 }
 
 /** @param {Options} options */

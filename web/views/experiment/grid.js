@@ -7,7 +7,7 @@
  */
 import { html, useLayoutEffect, useMemo, useRef } from "../../vendor/preact-htm.js";
 import { useKeys } from "../../keys.js";
-import { styleOf } from "../../plots/convergence.js";
+import { styleOf } from "../../plots/plan.js";
 import { useTheme } from "../../theme.js";
 import { valueOn } from "./axes.js";
 import { rankedAlong, ranks, ratioTo } from "./compare.js";

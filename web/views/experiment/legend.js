@@ -4,11 +4,12 @@
  * readable with many curves, and its names show and hide: the same filter that the pictures and the table obey.
  */
 import { html } from "../../vendor/preact-htm.js";
-import { slopeText, styleOf } from "../../plots/convergence.js";
+import { slopeText } from "../../plots/convergence.js";
+import { styleOf } from "../../plots/plan.js";
 import { isolating, toggling } from "./view.js";
 
 /** @typedef {import("../../api.js").Series} Series */
-/** @typedef {import("../../plots/convergence.js").Options} Options */
+/** @typedef {import("../../plots/plan.js").Options} Options */
 /** @typedef {import("./view.js").View} View */
 
 const DASHARRAY = /** @type {Record<string, string>} */ ({

@@ -4,6 +4,7 @@
  */
 import { html, useEffect, useMemo, useRef, useState } from "../../vendor/preact-htm.js";
 import { layout, reachesZero, traces, unplottable } from "../../plots/convergence.js";
+import { isNoise } from "../../plots/plan.js";
 import { plotly } from "../../plots/plotly.js";
 import { counted } from "../../format.js";
 import { useTheme } from "../../theme.js";
@@ -15,7 +16,7 @@ import { showing } from "./view.js";
 
 /** @typedef {import("../../api.js").Convergence} Convergence */
 /** @typedef {import("../../api.js").Series} Series */
-/** @typedef {import("../../plots/convergence.js").Options} Options */
+/** @typedef {import("../../plots/plan.js").Options} Options */
 /** @typedef {import("./view.js").View} View */
 /**
  * @typedef {object} Props
@@ -189,6 +190,9 @@ function notesOn(convergence, shown, view, options) {
     notes.push("Grey curves: their pictures were timed under different conditions (machine, threads or neighbours), so their seconds cannot be compared.");
   }
   const lost = unplottable(convergence, options);
+  if (convergence.metric.lower_is_better !== null && shown.some((series) => series.points.some((point) => isNoise(series, point)))) {
+    notes.push("Hollow points: more than half of the error is the reference's own noise (shaded). mse_cross has no such floor; a reference of more spp lowers it.");
+  }
   if (lost) notes.push(`${counted(lost, "point")} at or below zero: a logarithmic axis cannot show them; the table does.`);
   if (convergence.metric.lower_is_better !== null) notes.push("Dotted: slopes −1, −1.5 and −2.");
   return notes;
