@@ -131,7 +131,11 @@ function rangesOf(curves, log, options) {
   const points = curves.flatMap((curve) => curve.points);
   if (!points.length) return { x: [0, 2], y: log ? [-3, 0] : [0.9, 1.1] };
   const x = padded(points.map((point) => Math.log10(xOf(point, options))), 0.06, 0.12);
-  if (log) return { x, y: padded(points.map((point) => Math.log10(point.mean)), 0.08, 0.15) };
+  if (log) {
+    // The noise of a reference belongs into the picture where it has swallowed a point.
+    const noise = curves.flatMap(({ series, points: own }) => (own.some((point) => isNoise(series, point)) ? [Number(series.floor)] : []));
+    return { x, y: padded([...points.map((point) => point.mean), ...noise].map(Math.log10), 0.08, 0.15) };
+  }
   return { x, y: padded([1, ...points.flatMap((point) => [point.low ?? point.mean, point.high ?? point.mean])], 0.08, 0.01) };
 }
 
