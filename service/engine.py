@@ -8,27 +8,26 @@ renderer that does not start stalls it, with the reason on every page; it tries 
 
 from __future__ import annotations
 
-import contextlib
 import datetime
 import logging
 import platform
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
 from pathlib import Path
-from queue import Empty, Full, LifoQueue
 from typing import Any, TypeVar
 
 from jobs import experiments, queue, trash
 from jobs.artifacts import Artifacts
 from jobs.dispatcher import Dispatcher, News
-from jobs.executors.base import Failed, Finished, Passed
+from jobs.executors.base import Done, Failed, Finished, Passed, Released, Started
 from jobs.executors.local import LocalExecutor
 from jobs.store import Store
 from renderer.devices import Device
 from renderer.errors import DartboardError, EnvironmentProblem
+from service.readers import Readers
 from service.settings import usable_kernel_caches
 from service.standings import Standings
 
@@ -39,8 +38,7 @@ RETRY_SECONDS = 10.0  # after a stall
 CHANGE_SECONDS = 60.0  # longest wait for a change: a grid of 100 000 cells takes 5 s on a slow disk
 CLEANING_SECONDS = 60.0  # between two looks into the trash
 MEMORY = 0.8  # of the rate of drawing: what a new picture leaves of the old estimate
-READERS = 6  # read-only connections that are kept; more are opened when needed
-READER_CACHE_KIB = 8192
+ENDING = "the server is ending; start it again with `dartboard up` and ask once more"
 
 log = logging.getLogger("dartboard")
 
@@ -76,41 +74,6 @@ class Moment:
     queued: int = 0
 
 
-class Readers:
-    """Read-only connections, lent to one thread at a time."""
-
-    def __init__(self, data: Path):
-        self.data = data
-        self.free: LifoQueue[Store] = LifoQueue(READERS)
-
-    @contextlib.contextmanager
-    def lend(self) -> Iterator[Store]:
-        try:
-            store = self.free.get_nowait()
-        except Empty:
-            store = Store.read(self.data)
-            store.connection.pragma("cache_size", -READER_CACHE_KIB)
-        try:
-            yield store
-        except DartboardError:
-            self._give_back(store)
-            raise
-        except BaseException:
-            store.close()
-            raise
-        self._give_back(store)
-
-    def _give_back(self, store: Store) -> None:
-        try:
-            self.free.put_nowait(store)
-        except Full:
-            store.close()
-
-    def close(self) -> None:
-        while not self.free.empty():
-            self.free.get_nowait().close()
-
-
 class Engine:
     """
     One per server. ``start`` returns when the database is open, ``stop`` when nothing of it is left.
@@ -130,6 +93,7 @@ class Engine:
         self.dispatcher: Dispatcher | None = None
         self.waiting: list[tuple[Change[Any], Future[Any]]] = []
         self.lock = threading.Lock()
+        self.ended = False
         self.opened: Future[None] = Future()
         self.thread = threading.Thread(target=self._run, name="engine", daemon=True)
         self.cleaned = 0.0
@@ -143,9 +107,9 @@ class Engine:
         """End the render process and the thread; what is finished is kept, what is drawn goes back to the queue."""
         self.stopping.set()
         self.wanted.set()
-        dispatcher = self.dispatcher
-        if dispatcher is not None:
-            dispatcher.stop()
+        with self.lock:
+            if self.dispatcher is not None:
+                self.dispatcher.stop()
         self.thread.join()
         self.readers.close()
 
@@ -153,15 +117,16 @@ class Engine:
         """
         Have ``change(store, dispatcher)`` done by the engine's thread; its result, or its error.
 
-        Raises ``EnvironmentProblem`` if the engine does not come round to it.
+        Raises ``EnvironmentProblem`` if the engine does not come round to it, or ends first.
         """
         future: Future[T] = Future()
         with self.lock:
+            if self.ended:
+                raise EnvironmentProblem(ENDING)
             self.waiting.append((change, future))
-            dispatcher = self.dispatcher
-        self.wanted.set()
-        if dispatcher is not None:
-            dispatcher.ask(self._serve)
+            self.wanted.set()
+            if self.dispatcher is not None:
+                self.dispatcher.ask(self._serve)  # under the lock: what wakes it is closed when it is gone
         try:
             return future.result(CHANGE_SECONDS)
         except TimeoutError:
@@ -174,24 +139,39 @@ class Engine:
     # -- in the engine's thread ----------------------------------------------------------------------------------------
 
     def _run(self) -> None:
+        store: Store | None = None
         try:
             self.artifacts.prepare()
             store = Store.open(self.artifacts.data)
-        except BaseException as error:
-            self.opened.set_exception(error)
-            return
-        try:
             queue.recover(store)
             self._clean(store)
-            self._change(state="idle", revision=store.revision(), queued=int(store.value("open_cells")))
+            self._change(revision=store.revision(), queued=int(store.value("open_cells")))
             self.opened.set_result(None)
             while not self.stopping.is_set():
                 self._work(store)
+        except BaseException as error:
+            if self.opened.done():
+                log.exception("the engine has ended; start the server again")
+            else:
+                self.opened.set_exception(error)
         finally:
-            store.close()
+            self._refuse_the_rest()
+            if store is not None:
+                store.close()
 
     def _work(self, store: Store) -> None:
-        """Dispatch until the end, or until something stalls it."""
+        """Dispatch until the end, or until something stalls it; then wait for better times, or for somebody to ask."""
+        try:
+            self._dispatch(store)
+        except DartboardError as error:
+            self._stall(error)
+        except Exception as error:  # a bug of ours must not leave a server that looks alive and does nothing
+            log.exception("the engine stumbled")
+            self._stall(error)
+        if self.moment.trouble and not self.stopping.is_set():
+            self.wanted.wait(RETRY_SECONDS)
+
+    def _dispatch(self, store: Store) -> None:
         executor = LocalExecutor(
             self.device, kernels=usable_kernel_caches(self.artifacts.data), logs=self.artifacts.logs,
             cwd=self.artifacts.empty,
@@ -205,55 +185,58 @@ class Engine:
             self.dispatcher = dispatcher
         try:
             self._serve()
+            queue.recover(store)  # what a stall has left under way
             if not self.stopping.is_set():
                 dispatcher.run()
-        except DartboardError as error:
-            self._stall(error)
-        except Exception as error:  # a bug of ours must not leave a server that looks alive and does nothing
-            log.exception("the engine stumbled")
-            self._stall(error)
         finally:
             with self.lock:
                 self.dispatcher = None
             executor.close()
-        if self.moment.trouble and not self.stopping.is_set():
-            self.wanted.clear()
-            self.wanted.wait(RETRY_SECONDS)
-            with contextlib.suppress(DartboardError):
-                queue.recover(store)
 
     def _stall(self, error: Exception) -> None:
         log.warning("rendering has stalled: %s", error)
-        self._change(state="stalled", trouble=str(error) or type(error).__name__, drawing=None)
+        self._change(trouble=str(error) or type(error).__name__, drawing=None)
 
     def _serve(self) -> None:
         """Do what routes asked for."""
         while True:
             with self.lock:
                 if not self.waiting:
+                    self.wanted.clear()
                     return
                 change, future = self.waiting.pop(0)
             if not future.set_running_or_notify_cancel():
                 continue
             store, dispatcher = self.serving
             try:
-                future.set_result(change(store, dispatcher))
+                result = change(store, dispatcher)
+                self._look(store)  # first: who asked, and asks what is new now, sees it
             except BaseException as error:
                 future.set_exception(error)
-            self._look(store)
+            else:
+                future.set_result(result)
+
+    def _refuse_the_rest(self) -> None:
+        """Nobody will do what is still asked for, or will be: whoever waits is told so at once."""
+        with self.lock:
+            self.ended = True
+            waiting, self.waiting = self.waiting, []
+        for _, future in waiting:
+            if future.set_running_or_notify_cancel():
+                future.set_exception(EnvironmentProblem(ENDING))
 
     def _turn(self, store: Store) -> None:
         """Between two events: has something changed that no news tells?"""
         if time.monotonic() - self.cleaned > CLEANING_SECONDS:
             self._clean(store)
+        if self.moment.trouble and not self.serving[1].under_way:
+            self._change(trouble=None)  # with nothing to draw there is nothing that could be in trouble
         self._look(store)
 
     def _look(self, store: Store) -> None:
         revision = store.revision()
         if revision != self.moment.revision:
-            queued = int(store.value("open_cells"))
-            drawing = self.moment.drawing if self.dispatcher and self.dispatcher.under_way else None
-            self._change(revision=revision, queued=queued, drawing=drawing, state=self._state(drawing))
+            self._change(revision=revision, queued=int(store.value("open_cells")))
 
     def _clean(self, store: Store) -> None:
         self.cleaned = time.monotonic()
@@ -261,8 +244,10 @@ class Engine:
 
     def _hear(self, store: Store, news: News) -> None:
         """News of the dispatcher as a new moment."""
-        drawing, rate = self.moment.drawing, self.moment.rate
+        drawing, rate, trouble = self.moment.drawing, self.moment.rate, None
         match news.event:
+            case Started():
+                drawing = self._drawing(store, news)
             case Passed() as passed:
                 if drawing is None or drawing.cell != news.work.cell_id:
                     drawing = self._drawing(store, news)
@@ -270,31 +255,24 @@ class Engine:
                     drawing, role=passed.role, replicate=passed.k, done=passed.done, passes=passed.passes,
                     seconds=passed.seconds, preview=passed.preview,
                 )  # fmt: skip
+                self._change(drawing=drawing, trouble=None)
+                return
             case Finished() as finished:
                 width, height = news.work.spec.estimand.size
                 seconds = finished.render_seconds + finished.compile_seconds
                 now = width * height * news.work.spec.spp / max(seconds, 1e-3)
                 rate = now if rate is None else 1 / (MEMORY / rate + (1 - MEMORY) / now)
-                drawing = drawing or self._drawing(store, news)
-            case Failed() as failed:
-                log.warning("%s: %s", failed.error_class, failed.message)
-                drawing = None
-            case _ if news.kind == "started":
-                drawing = self._drawing(store, news)
-            case _:
-                drawing = None
-        if news.event.__class__ is Passed:
-            self._change(drawing=drawing, trouble=None, state=self._state(drawing))
-        else:
-            self._change(
-                drawing=drawing, rate=rate, trouble=None, state=self._state(drawing), revision=store.revision(),
-                queued=int(store.value("open_cells")),
-            )  # fmt: skip
-
-    def _state(self, drawing: Drawing | None) -> str:
-        if drawing is not None:
-            return "rendering"
-        return "starting" if self.dispatcher and self.dispatcher.under_way else "idle"
+            case Done() | Failed() | Released() as last:
+                if isinstance(last, Failed):
+                    log.warning("%s: %s", last.error_class, last.message)
+                if isinstance(last, Released):
+                    trouble = self.moment.trouble  # nothing was drawn: that says nothing about it
+                if drawing is not None and drawing.cell == news.work.cell_id:
+                    drawing = None
+        self._change(
+            drawing=drawing, rate=rate, trouble=trouble, revision=store.revision(),
+            queued=int(store.value("open_cells")),
+        )  # fmt: skip
 
     def _drawing(self, store: Store, news: News) -> Drawing:
         wanted = store.rows("experiments_of_cell", cell_id=news.work.cell_id)
@@ -306,8 +284,16 @@ class Engine:
         )
 
     def _change(self, **values: Any) -> None:
-        self.moment = replace(self.moment, **values)
+        moment = replace(self.moment, **values)
+        self.moment = replace(moment, state=self._state(moment))
         self.on_change()
+
+    def _state(self, moment: Moment) -> str:
+        if moment.trouble is not None:
+            return "stalled"
+        if moment.drawing is not None:
+            return "rendering"
+        return "starting" if self.dispatcher and self.dispatcher.under_way else "idle"
 
 
 def seconds_left(store: Store, experiment: int, rate: float | None) -> float | None:
