@@ -11,7 +11,8 @@ import contextlib
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
-from typing import TypeVar
+from concurrent.futures import Future
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,21 +40,34 @@ class Cache:
     def __init__(self, limit: int):
         self.limit, self.bytes = limit, 0
         self.held: OrderedDict[object, bytes | Floats] = OrderedDict()
+        self.making: dict[object, Future[Any]] = {}
         self.lock = threading.Lock()
 
     def get(self, key: object, make: Callable[[], T]) -> T:
-        """The value of ``key``; two threads that miss it at once both make it."""
+        """The value of ``key``, made once: fifty pages ask for a new picture in the same moment."""
         with self.lock:
             if key in self.held:
                 self.held.move_to_end(key)
                 return self.held[key]  # type: ignore[return-value]
-        value = make()
+            known = self.making.get(key)
+            if known is None:
+                made = self.making[key] = Future[Any]()
+        if known is not None:
+            return known.result()  # type: ignore[no-any-return]
+        try:
+            value = make()
+        except BaseException as error:
+            with self.lock:
+                del self.making[key]
+            made.set_exception(error)
+            raise
         with self.lock:
-            if key not in self.held:
-                self.held[key] = value
-                self.bytes += _size(value)
-                while self.bytes > self.limit and len(self.held) > 1:
-                    self.bytes -= _size(self.held.popitem(last=False)[1])
+            del self.making[key]
+            self.held[key] = value
+            self.bytes += _size(value)
+            while self.bytes > self.limit and len(self.held) > 1:
+                self.bytes -= _size(self.held.popitem(last=False)[1])
+        made.set_result(value)
         return value
 
 
