@@ -25,7 +25,7 @@ from service.api import cells, events, experiments, scenes, server
 from service.engine import Engine
 from service.hub import Hub
 from service.pictures import Cache, Pictures
-from service.problems import install, of_http
+from service.problems import RESPONSES, install, of_http
 from service.security import Guard
 
 WEB = Path(__file__).resolve().parent.parent / "web"
@@ -63,6 +63,7 @@ def create(engine: Engine, hub: Hub, token: str | None = None) -> FastAPI:
     app = FastAPI(
         title="Dartboard", version=__version__, lifespan=lifespan, docs_url=None, redoc_url=None,
         description="Rendering experiments that people can believe. Errors are problem documents (RFC 9457).",
+        responses=RESPONSES,
     )  # fmt: skip
     app.state.engine, app.state.hub = engine, hub
     app.state.pictures, app.state.answers = Pictures(engine.artifacts), Cache(ANSWER_BYTES)

@@ -39,7 +39,17 @@ KINDS: Sequence[tuple[type[DartboardError], str, str, int]] = (
 )
 RESPONSES: dict[int | str, dict[str, Any]] = {
     status: {"description": text, "content": {MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Problem"}}}}
-    for status, text in ((404, "unknown"), (422, "bad value"), (503, "the machine lacks something"))
+    for status, text in (
+        (401, "the token is missing"),
+        (403, "a page of another site"),
+        (404, "unknown"),
+        (409, "it does not fit the state of things"),
+        (413, "too large"),
+        (421, "another host"),
+        (422, "bad value"),
+        (503, "the machine lacks something"),
+        (507, "the data directory cannot be used"),
+    )
 }
 
 log = logging.getLogger("dartboard")

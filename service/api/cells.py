@@ -11,9 +11,8 @@ from jobs.errors import NotFound
 from service import schemas
 from service.deps import CellId, EngineDep, StoreDep
 from service.pictures import Pictures
-from service.problems import RESPONSES
 
-router = APIRouter(prefix="/api/cells", tags=["cells"], responses=RESPONSES)
+router = APIRouter(prefix="/api/cells", tags=["cells"])
 
 FOR_EVER = "private, max-age=31536000, immutable"
 NOT_AT_ALL = "no-store"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query, Response
@@ -14,9 +15,8 @@ from service import schemas, views
 from service.deps import EngineDep, ExperimentDep, HubDep
 from service.engine import Drawing, Engine, Moment
 from service.hub import EndOfStream, Hub, event, stream
-from service.problems import RESPONSES
 
-router = APIRouter(prefix="/api", tags=["events"], responses=RESPONSES)
+router = APIRouter(prefix="/api", tags=["events"])
 
 SSE: dict[int | str, dict[str, Any]] = {200: {"content": {"text/event-stream": {}}, "description": "events"}}
 LastEventId = Annotated[int | None, Header(ge=0, le=2**62)]
@@ -69,16 +69,16 @@ class Follower:
     async def news(self, moment: Moment) -> bytes | None:
         """The update, if there is anything new, and the progress of what is drawn for this experiment."""
         parts = []
-        now = (moment.revision, moment.state, moment.trouble, moment.drawing and moment.drawing.cell)
-        if now != self.told:
+        if _key(moment) != self.told:
             seen = self.seen
-            message = await self.hub.share(
+            update = await self.hub.share(
                 (self.experiment, seen), lambda: run_in_threadpool(_update, self.engine, self.experiment, seen, moment)
             )
-            if message is None:
+            if update is None:
                 raise EndOfStream(event("gone", "{}"))
-            self.told, self.seen = now, moment.revision
-            parts.append(message)
+            # What another stream had made may be of an earlier moment than this: then the next step tells the rest.
+            self.told, self.seen = update.told, update.revision
+            parts.append(update.message)
         drawing = moment.drawing
         if drawing and drawing.passes and drawing != self.drawing and self.experiment in drawing.experiments:
             parts.append(event("progress", _progress(drawing)))
@@ -96,7 +96,21 @@ def _overview(engine: Engine, moment: Moment) -> bytes:
     return event("update", views.to_json(data), moment.revision)
 
 
-def _update(engine: Engine, experiment: int, after: int, moment: Moment) -> bytes | None:
+def _key(moment: Moment) -> tuple[Any, ...]:
+    """What of a moment an update tells: when it differs, there is news."""
+    return moment.revision, moment.state, moment.trouble, moment.drawing and moment.drawing.cell
+
+
+@dataclass(frozen=True)
+class Told:
+    """An update as it is sent: the moment that it tells of, and the revision from which the next one goes on."""
+
+    message: bytes
+    told: tuple[Any, ...]
+    revision: int
+
+
+def _update(engine: Engine, experiment: int, after: int, moment: Moment) -> Told | None:
     """The update since a revision; None if the experiment is gone."""
     with engine.readers.lend() as store:
         try:
@@ -104,7 +118,7 @@ def _update(engine: Engine, experiment: int, after: int, moment: Moment) -> byte
         except NotFound:
             return None
         data = views.update(store, found, after, engine, moment)
-    return event("update", views.to_json(data), moment.revision)
+    return Told(event("update", views.to_json(data), data["revision"]), _key(moment), data["revision"])
 
 
 def _progress(drawing: Drawing) -> str:

@@ -19,9 +19,8 @@ from jobs.store import Store, now
 from service import bodies, schemas, submission, views
 from service.deps import EngineDep, ExperimentDep, ExperimentId, StoreDep
 from service.engine import Engine
-from service.problems import RESPONSES
 
-router = APIRouter(prefix="/api/experiments", tags=["experiments"], responses=RESPONSES)
+router = APIRouter(prefix="/api/experiments", tags=["experiments"])
 
 BODY = {
     "requestBody": {
@@ -36,6 +35,10 @@ BODY = {
     }
 }
 
+KNOWN: dict[int | str, dict[str, Any]] = {
+    200: {"model": schemas.Experiment | schemas.DryRun, "description": "an experiment that was there, or a dry run"}
+}
+
 
 @router.get("", response_model=list[schemas.Experiment])
 def list_experiments(
@@ -48,7 +51,7 @@ def list_experiments(
     return _json([item for item in found if name is None or item["name"] == name])
 
 
-@router.post("", openapi_extra=BODY, status_code=201, response_model=schemas.Experiment | schemas.DryRun)
+@router.post("", openapi_extra=BODY, status_code=201, response_model=schemas.Experiment, responses=KNOWN)
 async def submit(
     request: Request,
     engine: EngineDep,

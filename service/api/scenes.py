@@ -13,9 +13,8 @@ from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import SceneSource
 from service import bodies, schemas, uploads
 from service.deps import EngineDep, StoreDep
-from service.problems import RESPONSES
 
-router = APIRouter(prefix="/api/scenes", tags=["scenes"], responses=RESPONSES)
+router = APIRouter(prefix="/api/scenes", tags=["scenes"])
 
 ZIP = {
     "requestBody": {
