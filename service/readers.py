@@ -10,8 +10,8 @@ from queue import Empty, Full, LifoQueue
 from jobs.store import Store
 from renderer.errors import DartboardError
 
-KEPT = 6  # more are opened when needed, and closed afterwards
-CACHE_KIB = 8192
+KEPT = 40  # as many as there are threads that read; opening one costs a millisecond
+CACHE_KIB = 2048
 
 
 class Readers:
