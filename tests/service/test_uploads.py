@@ -1,0 +1,209 @@
+"""Scenes over the wire: a good folder arrives whole; whatever else an archive can hold is refused and leaves nothing."""
+
+from __future__ import annotations
+
+import io
+import stat
+import struct
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from service import schemas, uploads
+from tests.service.conftest import House, answer, answers, refusal
+
+SCENE = """<scene version="3.0.0">
+  <integrator type="path"><integer name="max_depth" value="4"/></integrator>
+  <sensor type="perspective">
+    <film type="hdrfilm"><integer name="width" value="12"/><integer name="height" value="8"/></film>
+  </sensor>
+  <emitter type="constant"/>
+  <shape type="sphere"/>
+</scene>"""
+WITH_MESH = SCENE.replace(
+    '<shape type="sphere"/>', '<shape type="ply"><string name="filename" value="meshes/a.ply"/></shape>'
+)
+MESH = b"ply\nformat ascii 1.0\nelement vertex 0\nelement face 0\nend_header\n"
+
+
+def packed(files: dict[str, str | bytes], compression: int = zipfile.ZIP_DEFLATED) -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", compression) as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return file.getvalue()
+
+
+def special(name: str, mode: int, content: bytes = b"/etc/passwd") -> bytes:
+    """An archive with one entry of another kind beside a good scene."""
+    file = io.BytesIO(packed({"scene.xml": SCENE}))
+    with zipfile.ZipFile(file, "a") as archive:
+        entry = zipfile.ZipInfo(name)
+        entry.external_attr = mode << 16
+        archive.writestr(entry, content)
+    return file.getvalue()
+
+
+def encrypted() -> bytes:
+    """The flag alone: nobody asks for a password that nobody would give."""
+    content = bytearray(packed({"scene.xml": SCENE}))
+    for signature, offset in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        at = content.index(signature) + offset
+        content[at] |= 1
+    return bytes(content)
+
+
+def lying_about_its_size(size: int) -> bytes:
+    """A bomb whose directory says that it unpacks to ten bytes."""
+    content = bytearray(packed({"scene.xml": b" " * size}))
+    for signature, offset in ((b"PK\x03\x04", 22), (b"PK\x01\x02", 24)):
+        at = content.index(signature) + offset
+        content[at : at + 4] = struct.pack("<I", 10)
+    return bytes(content)
+
+
+def twice() -> bytes:
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w") as archive, pytest.warns(UserWarning, match="Duplicate"):
+        archive.writestr("scene.xml", SCENE)
+        archive.writestr("scene.xml", SCENE)
+    return file.getvalue()
+
+
+def upload(house: House, content: bytes, name: str = "room", **query: str):
+    return house.client.post(
+        "/api/scenes", params={"name": name, **query}, content=content, headers={"content-type": "application/zip"}
+    )
+
+
+def left_behind(house: House) -> list[Path]:
+    return list(house.artifacts.work.glob("upload-*")) + list(house.artifacts.scenes.glob("*"))
+
+
+def test_a_folder_arrives_with_what_it_refers_to_and_nothing_else(house: House) -> None:
+    content = packed({"scene.xml": WITH_MESH, "meshes/a.ply": MESH, "meshes/unused.ply": MESH, "notes.txt": "mine"})
+    scene = answer(upload(house, content), schemas.Scene)
+    assert (scene.name, scene.main, scene.builtin) == ("room", "scene.xml", False)
+    assert (scene.width, scene.height, scene.max_depth) == (12, 8, 4)
+    assert scene.files == ["meshes/a.ply", "scene.xml"]
+    folder = house.artifacts.scene_folder(scene.digest)
+    kept = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    assert kept == {"scene.xml": WITH_MESH.encode(), "meshes/a.ply": MESH}
+    assert not list(house.artifacts.work.glob("upload-*"))
+    assert scene in answers(house.client.get("/api/scenes"), schemas.Scene)
+
+
+def test_the_same_folder_is_the_same_scene_however_it_was_packed(house: House) -> None:
+    plain = answer(upload(house, packed({"scene.xml": SCENE})), schemas.Scene)
+    wrapped = answer(upload(house, packed({"room/scene.xml": SCENE}, zipfile.ZIP_STORED)), schemas.Scene)
+    assert plain.digest == wrapped.digest
+
+
+def test_the_main_file_may_be_named(house: House) -> None:
+    both = packed({"day.xml": SCENE, "night.xml": SCENE.replace("12", "16")})
+    assert "2 files day.xml, night.xml" in refusal(upload(house, both), 422, "bad-scene").detail
+    assert answer(upload(house, both, main="night.xml"), schemas.Scene).width == 16
+    for wrong in ("dusk.xml", "../day.xml", "/etc/passwd"):
+        refusal(upload(house, both, main=wrong), 422)
+
+
+def test_an_uploaded_scene_is_what_a_grid_names_and_nothing_else_of_this_machine_is(
+    house: House, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.xml").write_text(SCENE)
+    scene = answer(upload(house, packed({"scene.xml": SCENE})), schemas.Scene)
+    grid = {"scenes": ["my room"], "spp": [1], "reference": False}
+    body = {"grid": grid, "scenes": {"my room": scene.digest}}
+    assert house.client.post("/api/experiments?dry_run=true", json=body).status_code == 200
+    for name in (str(tmp_path / "mine.xml"), "../mine.xml", "/etc/passwd", ".", ""):
+        refusal(house.client.post("/api/experiments", json={"grid": {**grid, "scenes": [name]}}), 422, "bad-grid")
+    for digest in ("0" * 64, "", "../../etc", scene.digest.upper()):
+        refusal(house.client.post("/api/experiments", json={**body, "scenes": {"my room": digest}}), 422, "bad-grid")
+
+
+@pytest.mark.parametrize(
+    ("content", "word"),
+    [
+        (lambda: packed({"../scene.xml": SCENE}), "leads out"),
+        (lambda: packed({"a/../../scene.xml": SCENE}), "leads out"),
+        (lambda: packed({"/scene.xml": SCENE}), "leads out"),
+        (lambda: packed({"C:\\scene.xml": SCENE}), "refused"),
+        (lambda: packed({"scene.xml": SCENE, "plugins/evil.obj": b""}), "plugins"),
+        (lambda: packed({"scene.xml": SCENE, "evil.so": b"\x7fELF"}), "extension"),
+        (lambda: packed({"scene.xml": SCENE, "run": b"#!"}), "extension"),
+        (lambda: special("link.ply", stat.S_IFLNK | 0o777), "link"),
+        (lambda: special("disk.ply", stat.S_IFBLK | 0o666), "device"),
+        (lambda: special("pipe.ply", stat.S_IFIFO | 0o666), "regular"),
+        (encrypted, "encrypted"),
+        (twice, "twice"),
+        (lambda: packed({"scene.xml": SCENE.replace("sphere", "../../evil")}), "unknown plugin"),
+        (lambda: packed({"scene.xml": WITH_MESH.replace("meshes/a.ply", "/etc/passwd")}), "leads out"),
+        (lambda: packed({"scene.xml": WITH_MESH}), "a.ply"),
+        (lambda: packed({"scene.xml": '<!DOCTYPE x [<!ENTITY a "b">]>' + SCENE}), "document type"),
+        (lambda: packed({"scene.xml": "not xml"}), "XML"),
+        (lambda: packed({"a.xml": SCENE, "b.xml": SCENE + " "}), "2 files"),
+        (lambda: packed({"readme.txt": "hello"}), "no .xml"),
+        (lambda: packed({}), "no .xml"),
+        (lambda: b"", "zip"),
+        (lambda: b"PK\x03\x04 and then nothing", "zip"),
+        (lambda: packed({"scene.xml": SCENE})[:-40], "zip"),
+        (lambda: packed({"scene.xml": SCENE})[60:], "zip"),
+    ],
+)  # fmt: skip
+def test_what_is_no_scene_is_refused_in_words_and_leaves_nothing(
+    house: House, content: Callable[[], bytes], word: str
+) -> None:
+    found = refusal(upload(house, content()), 422, "bad-scene")
+    assert word.lower() in found.detail.lower(), found.detail
+    assert str(house.artifacts.data) not in found.detail
+    assert left_behind(house) == []
+
+
+def test_a_bomb_is_stopped_while_it_unpacks(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What counts is what is written, not what the archive says: it may say nothing, or lie."""
+    monkeypatch.setattr(uploads, "MAX_BYTES", 2**20)
+    written = 0
+    original = uploads._write
+
+    def watched(*arguments):
+        nonlocal written
+        left = original(*arguments)
+        written += arguments[3] - left
+        return left
+
+    monkeypatch.setattr(uploads, "_write", watched)
+    assert "1 MiB" in refusal(upload(house, packed({"scene.xml": b" " * 2**24})), 413, "too-large").detail
+    many = {f"{n}.obj": b" " * 2**18 for n in range(64)}
+    refusal(upload(house, packed(many)), 413, "too-large")
+    refusal(upload(house, lying_about_its_size(2**24)), 422, "bad-scene")
+    assert written <= 2**20
+    assert left_behind(house) == []
+
+
+def test_too_many_files_are_refused_before_any_is_written(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uploads, "_write", lambda *_: pytest.fail("it was unpacked"))
+    many = packed({f"{n}.obj": b"" for n in range(uploads.MAX_FILES + 1)}, zipfile.ZIP_STORED)
+    assert "2001 files" in refusal(upload(house, many), 413, "too-large").detail
+
+
+def test_a_body_over_the_limit_is_cut_off(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    from service import bodies
+
+    monkeypatch.setattr(bodies, "SCENE_BYTES", 2**20)
+    monkeypatch.setattr(bodies, "GRID_BYTES", 2**20)
+    refusal(upload(house, b"x" * (2**20 + 1)), 413, "too-large")
+    refusal(house.client.post("/api/experiments", content=b"x" * (2**20 + 1)), 413, "too-large")
+    pieces = (b"x" * 2**16 for _ in range(32))  # without a length: it is counted as it comes
+    refusal(house.client.post("/api/scenes?name=room", content=pieces), 413, "too-large")
+
+
+@pytest.mark.parametrize("name", [" ", "two\nlines", "a" * 201, "\x00"])
+def test_a_name_that_cannot_be_shown_is_refused(house: House, name: str) -> None:
+    refusal(upload(house, packed({"scene.xml": SCENE}), name=name), 422)
+
+
+@pytest.mark.parametrize("name", ["raum süd", "部屋/scene.xml", "<script>alert(1)</script>", "a" * 200])
+def test_any_name_that_can_be_shown_is_one(house: House, name: str) -> None:
+    assert answer(upload(house, packed({"scene.xml": SCENE}), name=name), schemas.Scene).name == name
