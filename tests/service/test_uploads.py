@@ -1,4 +1,4 @@
-"""Scenes over the wire: a good folder arrives whole; whatever else an archive can hold is refused and leaves nothing."""
+"""Scenes over the wire: a good folder arrives whole; whatever else an archive holds is refused and leaves nothing."""
 
 from __future__ import annotations
 
