@@ -23,6 +23,7 @@ from jobs.errors import Conflict, DataDirectoryProblem, GridError, NotFound, Was
 from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, SceneError, UnknownName
 from service.schemas import Fault, Problem
 
+PLURALS = {"sampler": "samplers", "integrator": "integrators", "scene": "scenes"}  # an axis → its key in a grid
 MEDIA_TYPE = "application/problem+json"
 # The first class that fits counts.
 KINDS: Sequence[tuple[type[DartboardError], str, str, int]] = (
@@ -97,7 +98,10 @@ def field_of(sentence: str) -> str | None:
         sentence,
     )
     found = named or keyed or re.search(r"in (samplers|integrators|rfilter)\b", sentence)
-    return found[1] if found else None
+    if found:
+        return found[1]
+    unknown = re.match(r"unknown (sampler|integrator|scene|colour|rfilter)\b", sentence)
+    return PLURALS.get(unknown[1], unknown[1]) if unknown else None
 
 
 def install(app: FastAPI) -> None:
