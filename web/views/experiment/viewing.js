@@ -98,7 +98,7 @@ function referenceOf(cell, size) {
   return {
     key: `reference ${cell.cell}`,
     label: "reference",
-    detail: `${describe(cell)}, ${cell.had} of ${cell.wanted} halves`,
+    detail: [cell.scene, cell.integrator, cell.sampler, ...(cell.had < cell.wanted ? [`${cell.had} of ${cell.wanted} pictures`] : [])].join(" · "),
     cell: cell.cell,
     role: "reference",
     v: tokenOf(cell, undefined),
