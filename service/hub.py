@@ -10,17 +10,23 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import logging
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable
-from typing import Any
+from typing import Any, TypeVar
 
+from renderer.errors import DartboardError
 from service.engine import Engine, Moment
+
+T = TypeVar("T")
 
 STEP_SECONDS = 0.25  # between two messages on one stream: fast enough for an eye, slow enough for fifty pages
 STEP_COSTS = 20.0  # a step lasts at least so many times what its messages took to make: 5 % of one core …
 LONGEST_STEP_SECONDS = 2.0  # … but a page never waits longer
 KEEP_ALIVE_SECONDS = 15.0
 RETRY_MILLISECONDS = 1000  # before a browser connects again
+
+log = logging.getLogger("dartboard")
 
 
 class Hub:
@@ -32,7 +38,7 @@ class Hub:
         self.turned = asyncio.Event()  # replaced at every step
         self.closing = False
         self.cost = 0.0  # seconds that the messages of this step took
-        self.shared: dict[tuple[Any, ...], asyncio.Task[bytes | None]] = {}
+        self.shared: dict[tuple[Any, ...], asyncio.Task[Any]] = {}
 
     def poke(self) -> None:
         """Something changed. From any thread."""
@@ -66,18 +72,29 @@ class Hub:
             return False
         return True
 
-    async def share(self, key: tuple[Any, ...], work: Callable[[], Awaitable[bytes | None]]) -> bytes | None:
-        """The result of ``work`` for everybody who asks under this key before the next step."""
-        if key not in self.shared:
-            self.shared[key] = asyncio.ensure_future(self._timed(work))
-        return await asyncio.shield(self.shared[key])
+    async def share(self, key: tuple[Any, ...], work: Callable[[], Awaitable[T]]) -> T:
+        """The result of ``work`` for everybody who asks under this key soon, and before the next step."""
+        task: asyncio.Task[T] | None = self.shared.get(key)
+        if task is None:
+            task = self.shared[key] = asyncio.ensure_future(self._timed(work))
+            task.add_done_callback(lambda done: self._forget_later(key, done))
+        return await asyncio.shield(task)
 
-    async def _timed(self, work: Callable[[], Awaitable[bytes | None]]) -> bytes | None:
+    async def _timed(self, work: Callable[[], Awaitable[T]]) -> T:
         start = time.perf_counter()
         try:
             return await work()
         finally:
             self.cost += time.perf_counter() - start
+
+    def _forget_later(self, key: tuple[Any, ...], task: asyncio.Task[Any]) -> None:
+        """Where nothing happens there is no next step: what streams of long ago were told is not kept for it."""
+
+        def forget() -> None:
+            if self.shared.get(key) is task:
+                del self.shared[key]
+
+        asyncio.get_running_loop().call_later(STEP_SECONDS, forget)
 
     def _turn(self) -> None:
         self.turned.set()
@@ -109,6 +126,9 @@ async def stream(hub: Hub, engine: Engine, news: Callable[[Moment], Awaitable[by
             except EndOfStream as end:
                 yield end.message
                 return
+            except DartboardError as error:
+                log.warning("a page has to wait for its news: %s", error)
+                message = None
             if message is not None:
                 yield message
         turned = await hub.step(seen)

@@ -100,11 +100,12 @@ def worker(engine: Engine, moment: Moment) -> dict[str, Any]:
 
 def update(store: Store, found: Experiment, after: int, engine: Engine, moment: Moment) -> dict[str, Any]:
     """``schemas.Update``: what is new of an experiment since a revision."""
+    revision = store.revision()  # first: what is committed meanwhile comes again with the next update
     reload = cells.touched(store, found.id, after)
     page = None if reload else cells.page(store, found.id, after=after, limit=cells.PAGE)
     too_many = page is not None and page.next is not None
     return {
-        "revision": moment.revision, "experiment": experiment(store, found, engine),
+        "revision": revision, "experiment": experiment(store, found, engine),
         "worker": worker(engine, moment),
         "reload": reload or too_many, "cells": [] if page is None or too_many else page.cells,
     }  # fmt: skip
