@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import tempfile
+from pathlib import Path
 from typing import IO
 
 from fastapi import Request
 
+from jobs import disk
 from service.problems import TooLarge
 
 GRID_BYTES = 2**24  # a grid file of 16 MiB is refused on the command line too
@@ -21,15 +23,20 @@ async def read(request: Request, limit: int, what: str) -> bytes:
         return file.read()
 
 
-async def save(request: Request, limit: int, what: str) -> IO[bytes]:
-    """The body in a temporary file, at its start; the caller closes it. Raises ``TooLarge`` as soon as it is."""
-    file = tempfile.TemporaryFile()  # noqa: SIM115 - the caller's
-    try:
-        await _copy(request, file, limit, what)
-    except BaseException:
-        file.close()
-        raise
-    file.seek(0)
+async def save(request: Request, limit: int, what: str, data: Path) -> IO[bytes]:
+    """
+    The body in a temporary file in a data directory, at its start; the caller closes it.
+
+    Raises ``TooLarge`` as soon as it is, and ``DataDirectoryProblem`` for a disk that is full.
+    """
+    with disk.explained(data):
+        file = tempfile.TemporaryFile(dir=data)  # noqa: SIM115 - the caller's
+        try:
+            await _copy(request, file, limit, what)
+            file.seek(0)
+        except BaseException:
+            file.close()
+            raise
     return file
 
 

@@ -8,14 +8,18 @@ no more bytes than allowed are ever written, whatever the archive claims. Then t
 
 from __future__ import annotations
 
+import contextlib
+import os
 import stat
 import tempfile
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
-from typing import IO
+from typing import IO, TypeVar
 
+from jobs import disk
 from jobs.artifacts import Artifacts
 from jobs.store import Store
 from renderer.errors import SceneError, UnknownName, shown
@@ -26,9 +30,15 @@ from renderer.scenes.sources import SceneSource
 from service.engine import Engine
 from service.problems import TooLarge
 
+T = TypeVar("T")
+
 MAX_FILES = 2000  # in an archive
 MAX_BYTES = 2**29  # unpacked
 MAX_NAME = 200  # characters
+MAX_PART = 255  # bytes of the name of a file or folder, on any usual file system
+MAX_PATH = 1000  # bytes of a path in an archive
+MAX_DIRECTORY = 2**21  # bytes of an archive's list of files: a kilobyte for each
+END_BYTES = 22  # of the record at the end of an archive, without its comment
 
 
 def receive(engine: Engine, archive: IO[bytes], name: str, main: str | None) -> SceneSource:
@@ -39,11 +49,15 @@ def receive(engine: Engine, archive: IO[bytes], name: str, main: str | None) -> 
     Raises ``SceneError`` with the reasons, ``TooLarge`` over a limit.
     """
     _check_name(name)
-    with tempfile.TemporaryDirectory(prefix="upload-", dir=engine.artifacts.work) as folder:
-        root = Path(folder)
-        _unpack(archive, root, name)
+    with disk.explained(engine.artifacts.data):
+        folder = tempfile.TemporaryDirectory(prefix="upload-", dir=engine.artifacts.work)
+    with folder:
+        root = Path(folder.name)
+        with disk.explained(engine.artifacts.data):
+            _unpack(archive, root, name)
+        inside = _without_wrapper(root)
         try:
-            source = replace(sources.find(main or ".", _without_wrapper(root)), name=name)
+            source = replace(sources.find(_main(inside, main, name), inside), name=name)
         except SceneError as error:
             raise SceneError(str(error).replace(str(root), "the archive").replace("'.'", shown(name))) from None
         sources.snapshot(source, engine.artifacts.scenes)
@@ -79,8 +93,9 @@ def everything(store: Store, artifacts: Artifacts) -> list[SceneSource]:
     found = []
     for row in store.rows("uploaded_scenes"):
         folder = artifacts.scene_folder(row["digest"])
-        if folder.is_dir():
-            found.append(replace(_kept(folder, row["main"]), name=row["name"]))
+        with contextlib.suppress(SceneError):  # a snapshot that somebody has damaged hides no other
+            if folder.is_dir():
+                found.append(replace(_kept(folder, row["main"]), name=row["name"]))
     return found
 
 
@@ -95,20 +110,57 @@ def _check_name(name: str) -> None:
         raise SceneError(f"the name {shown(name)} is not allowed; give 1 to {MAX_NAME} printable characters")
 
 
+def _main(folder: Path, main: str | None, name: str) -> str:
+    """What to look for in the folder: nothing outside of it, whatever a client names."""
+    there = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.xml"))
+    if main is None:
+        return "."
+    if main not in there:
+        held = ", ".join(there[:5]) or "no .xml file"
+        raise SceneError(f"there is no {shown(main)} in the archive of {shown(name)}; it holds {held}")
+    return main
+
+
 def _unpack(archive: IO[bytes], root: Path, name: str) -> None:
+    """Raises ``SceneError`` for what is no sound archive, ``TooLarge``, and ``OSError`` for the disk alone."""
+    if _directory_bytes(archive) > MAX_DIRECTORY:
+        raise TooLarge(f"the archive of {shown(name)} has a list of files of more than {MAX_DIRECTORY >> 20} MiB")
+    with _read(name, lambda: zipfile.ZipFile(archive)) as opened:
+        entries = [entry for entry in opened.infolist() if not entry.filename.endswith("/")]
+        if len(entries) > MAX_FILES:
+            raise TooLarge(f"the archive of {shown(name)} has {len(entries)} files, more than {MAX_FILES}")
+        left = MAX_BYTES
+        for entry in entries:
+            fault = _fault(entry)
+            if fault:
+                raise SceneError(f"the archive of {shown(name)} is refused: {shown(entry.filename)} {fault}")
+            left = _write(opened, entry, root, left, name)
+
+
+def _read(name: str, step: Callable[[], T]) -> T:
+    """What a step of reading the archive gives. zipfile raises a dozen kinds of errors for what is no archive."""
     try:
-        with zipfile.ZipFile(archive) as opened:
-            entries = [entry for entry in opened.infolist() if not entry.is_dir()]
-            if len(entries) > MAX_FILES:
-                raise TooLarge(f"the archive of {shown(name)} has {len(entries)} files, more than {MAX_FILES}")
-            left = MAX_BYTES
-            for entry in entries:
-                fault = _fault(entry)
-                if fault:
-                    raise SceneError(f"the archive of {shown(name)} is refused: {shown(entry.filename)} {fault}")
-                left = _write(opened, entry, root / entry.filename, left, name)
-    except (zipfile.BadZipFile, zipfile.LargeZipFile, NotImplementedError, RuntimeError, EOFError, OSError) as error:
-        raise SceneError(f"the archive of {shown(name)} cannot be read ({error}); send a zip of the folder") from None
+        return step()
+    except Exception as error:
+        reason = str(error)[:100] or type(error).__name__
+        raise SceneError(f"the archive of {shown(name)} cannot be read ({reason}); send a zip of the folder") from None
+
+
+def _directory_bytes(archive: IO[bytes]) -> int:
+    """
+    How long an archive says that its list of files is; 0 where it says nothing. zipfile makes an object of half a
+    kilobyte of each entry before anybody can count them.
+    """
+    size = archive.seek(0, os.SEEK_END)
+    archive.seek(max(0, size - END_BYTES - 2**16))
+    tail = archive.read()
+    archive.seek(0)
+    end = tail.rfind(b"PK\5\6")
+    if end < 0 or len(tail) < end + END_BYTES:
+        return 0
+    if tail[max(0, end - 20) :].startswith(b"PK\6\7"):
+        return MAX_DIRECTORY + 1  # zip64, for more files than any scene has
+    return int.from_bytes(tail[end + 12 : end + 16], "little")
 
 
 def _fault(entry: zipfile.ZipInfo) -> str | None:
@@ -118,21 +170,27 @@ def _fault(entry: zipfile.ZipInfo) -> str | None:
         return "is no regular file (a link or a device); put the file itself there"
     if entry.flag_bits & 0x1:
         return "is encrypted; send it without a password"
+    if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+        return "is packed in an unusual way; pack it with deflate, as zip does"
+    path = PurePosixPath(entry.filename)
+    if len(str(path).encode()) > MAX_PATH or any(len(part.encode()) > MAX_PART for part in path.parts):
+        return f"has too long a name; give at most {MAX_PART} bytes to a file or folder, and {MAX_PATH} to a path"
     if fault := file_fault(entry.filename):
         return fault
-    suffix = PurePosixPath(entry.filename).suffix.lower()
+    suffix = path.suffix.lower()
     if suffix != ".xml" and suffix not in EXTENSIONS:
         return f"has an extension that no scene needs; allowed: .xml {' '.join(sorted(EXTENSIONS))}"
     return None
 
 
-def _write(opened: zipfile.ZipFile, entry: zipfile.ZipInfo, to: Path, left: int, name: str) -> int:
+def _write(opened: zipfile.ZipFile, entry: zipfile.ZipInfo, root: Path, left: int, name: str) -> int:
     """Unpack one file, no more than ``left`` bytes; how many are left after it."""
-    if to.exists():
+    to = root / entry.filename
+    if to.exists() or any(folder.is_file() for folder in to.parents):
         raise SceneError(f"the archive of {shown(name)} holds {shown(entry.filename)} twice; pack it anew")
     to.parent.mkdir(parents=True, exist_ok=True)
-    with opened.open(entry) as packed, to.open("xb") as file:
-        while block := packed.read(2**16):
+    with _read(name, lambda: opened.open(entry)) as packed, to.open("xb") as file:
+        while block := _read(name, lambda: packed.read(2**16)):
             left -= len(block)
             if left < 0:
                 raise TooLarge(f"the archive of {shown(name)} unpacks to more than {MAX_BYTES >> 20} MiB")

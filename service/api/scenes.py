@@ -8,6 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from fastapi.concurrency import run_in_threadpool
 
+from renderer.errors import shown
 from renderer.scenes import sources
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import SceneSource
@@ -45,7 +46,8 @@ async def upload(
     Upload a scene: a zip of its folder, at most 256 MiB. It is vetted (only plugins that ship with Mitsuba, only files
     of its own folder) and kept by its digest; a submission then says `"scenes": {NAME: digest}`.
     """
-    with await bodies.save(request, bodies.SCENE_BYTES, f"the archive of {name!r}") as archive:
+    what = f"the archive of {shown(name)}"
+    with await bodies.save(request, bodies.SCENE_BYTES, what, engine.artifacts.data) as archive:
         return _scene(await run_in_threadpool(uploads.receive, engine, archive, name, main))
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import io
+import os
 import stat
 import struct
 import zipfile
@@ -10,8 +12,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from service import schemas, uploads
+from renderer.errors import SceneError
+from service import bodies, schemas, uploads
+from service.problems import TooLarge
 from tests.service.conftest import House, answer, answers, refusal
 
 SCENE = """<scene version="3.0.0">
@@ -189,14 +195,143 @@ def test_too_many_files_are_refused_before_any_is_written(house: House, monkeypa
 
 
 def test_a_body_over_the_limit_is_cut_off(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
-    from service import bodies
-
     monkeypatch.setattr(bodies, "SCENE_BYTES", 2**20)
     monkeypatch.setattr(bodies, "GRID_BYTES", 2**20)
     refusal(upload(house, b"x" * (2**20 + 1)), 413, "too-large")
     refusal(house.client.post("/api/experiments", content=b"x" * (2**20 + 1)), 413, "too-large")
     pieces = (b"x" * 2**16 for _ in range(32))  # without a length: it is counted as it comes
     refusal(house.client.post("/api/scenes?name=room", content=pieces), 413, "too-large")
+
+
+def test_a_main_file_is_one_of_the_archive(house: House, tmp_path: Path) -> None:
+    """Not a scene of this machine, not one beside the folder, not a built-in one, and not a name of any length."""
+    (tmp_path / "mine.xml").write_text(SCENE)
+    (house.artifacts.work / "beside.xml").write_text(SCENE)
+    both = packed({"day.xml": SCENE, "night.xml": SCENE, "sub/dusk.xml": SCENE})
+    outside = [str(tmp_path / "mine.xml"), "../beside.xml", "sub/../../beside.xml", "cornell_box", "a" * 200, "", "."]
+    for main in [*outside, "ü" * 200, "sub", "DAY.XML", "day.xml/"]:
+        found = refusal(upload(house, both, main=main), 422, "bad-scene")
+        assert "it holds day.xml, night.xml, sub/dusk.xml" in found.detail
+    assert left_behind(house) == []
+    assert answer(upload(house, both, main="sub/dusk.xml"), schemas.Scene).files == ["dusk.xml"]
+
+
+def test_names_of_any_script_arrive(house: House) -> None:
+    scene = WITH_MESH.replace("meshes/a.ply", "größe/部屋 é.ply")
+    found = answer(upload(house, packed({"scene.xml": scene, "größe/部屋 é.ply": MESH})), schemas.Scene)
+    assert (house.artifacts.scene_folder(found.digest) / "größe" / "部屋 é.ply").read_bytes() == MESH
+
+
+@pytest.mark.parametrize(
+    ("files", "word"),
+    [
+        ({"a.xml": SCENE, "a.xml/b.ply": MESH}, "twice"),
+        ({"scene.xml": SCENE, "x" * 256 + ".ply": MESH}, "too long a name"),
+        ({"scene.xml": SCENE, "ü" * 128 + ".ply": MESH}, "too long a name"),
+        ({"scene.xml": SCENE, "d/" * 600 + "a.ply": MESH}, "too long a name"),
+        ({"scene.xml": SCENE, "$HOME.ply": MESH}, "put together"),
+        ({"scene.xml": SCENE, "a\x01.ply": MESH}, "not a file name"),
+    ],
+)
+def test_a_name_that_no_folder_holds_is_the_archives_fault(
+    house: House, files: dict[str, str | bytes], word: str
+) -> None:
+    found = refusal(upload(house, packed(files)), 422, "bad-scene")
+    assert word in found.detail
+    assert str(house.artifacts.data) not in found.detail
+    assert left_behind(house) == []
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_only_usual_packing_is_unpacked(house: House, method: int) -> None:
+    """An LZMA stream may ask for gigabytes before it gives a byte."""
+    assert "unusual way" in refusal(upload(house, packed({"scene.xml": SCENE}, method)), 422, "bad-scene").detail
+
+
+def test_a_list_of_files_is_not_read_to_its_end_to_be_refused(house: House, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A hundred thousand entries, also where a zip64 record says how many they are."""
+    monkeypatch.setattr(uploads.zipfile, "ZipFile", lambda *_: pytest.fail("it was read"))
+    entry = struct.pack("<4s6H3L5H2L", b"PK\1\2", *[20] * 2, *[0] * 4, *[0] * 3, 1, *[0] * 4, 0, 0) + b"a"
+    entries, count = entry * 10**5, 10**5
+    end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, count % 2**16, count % 2**16, len(entries), 0, 0)
+    refusal(upload(house, entries + end), 413, "too-large")
+    locator = struct.pack("<4sLQL", b"PK\6\7", 0, len(entries), 1)
+    refusal(upload(house, entries + locator + end), 413, "too-large")
+
+
+GOOD = packed({"room/scene.xml": WITH_MESH, "room/meshes/a.ply": MESH})
+
+
+@given(
+    changes=st.lists(st.tuples(st.integers(0, len(GOOD) - 1), st.integers(0, 255)), min_size=1, max_size=6),
+    cut=st.none() | st.integers(0, len(GOOD)),
+    twice=st.booleans(),
+)
+@settings(max_examples=400, deadline=None, derandomize=True)
+def test_a_damaged_archive_is_unpacked_or_refused_and_nothing_else(
+    tmp_path_factory: pytest.TempPathFactory, changes: list[tuple[int, int]], cut: int | None, twice: bool
+) -> None:
+    """Any bytes changed, cut off, or said twice: no error but ours, and no file outside of the folder."""
+    content = bytearray(GOOD)
+    for place, byte in changes:
+        content[place] = byte
+    damaged = bytes(content[:cut]) * (2 if twice else 1)
+    folder = tmp_path_factory.mktemp("unpacked")
+    try:
+        uploads._unpack(io.BytesIO(damaged), folder / "inside", "room")
+    except (SceneError, TooLarge) as error:
+        assert str(error).isprintable()
+        assert str(folder) not in str(error)
+    assert {path.name for path in folder.iterdir()} <= {"inside"}
+
+
+@given(content=st.binary(max_size=300))
+@settings(max_examples=200, deadline=None, derandomize=True)
+def test_no_bytes_at_all_make_the_reading_stumble(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
+    for start in (b"", b"PK\x03\x04", b"PK\x05\x06"):
+        with pytest.raises((SceneError, TooLarge)):
+            uploads._unpack(io.BytesIO(start + content), tmp_path_factory.getbasetemp() / "never", "room")
+
+
+@pytest.mark.parametrize("place", ["body", "folder", "file"])
+def test_a_full_disk_is_not_the_archives_fault(house: House, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    where = {
+        "body": (bodies.tempfile, "TemporaryFile"), "folder": (uploads.tempfile, "TemporaryDirectory"),
+        "file": (Path, "mkdir"),
+    }  # fmt: skip
+    monkeypatch.setattr(*where[place], full)
+    found = refusal(upload(house, packed({"scene.xml": SCENE})), 507, "data-directory")
+    assert "is full; free some space" in found.detail
+
+
+def test_a_snapshot_that_somebody_damaged_hides_no_other(house: House) -> None:
+    first, second = (answer(upload(house, packed({"scene.xml": SCENE + " " * n})), schemas.Scene) for n in range(2))
+    main = house.artifacts.scene_folder(first.digest) / "scene.xml"
+    main.chmod(0o644)
+    main.write_text("no scene at all")
+    listed = {scene.digest for scene in answers(house.client.get("/api/scenes"), schemas.Scene)}
+    assert second.digest in listed and first.digest not in listed
+
+
+def test_an_uploaded_scene_is_rendered_from_its_snapshot(rendered: House) -> None:
+    """From a zip to a measured picture, in a render process of its own; its experiment says which files it is of."""
+    content = packed({"room/scene.xml": SCENE})
+    scene = answer(upload(rendered, content, name="my room"), schemas.Scene)
+    grid = {"name": "uploaded", "scenes": ["my room"], "spp": [4], "replicates": 2, "reference": {"spp": 32}}
+    body = {"grid": grid, "scenes": {"my room": scene.digest}}
+    found = answer(rendered.client.post("/api/experiments", json=body), schemas.Experiment)
+    rendered.finish(found.id)
+    detail = answer(rendered.client.get(f"/api/experiments/{found.id}"), schemas.ExperimentDetail)
+    assert detail.paths == {"my room": scene.digest}
+    assert detail.scenes == [
+        schemas.SceneInfo(name="my room", width=12, height=8, reference=detail.scenes[0].reference)
+    ]
+    page = answer(rendered.client.get(f"/api/experiments/{found.id}/cells"), schemas.Cells)
+    assert {cell.state for cell in page.cells} == {"done"}
+    assert all(cell.metrics for cell in page.cells if cell.role == "cell")
 
 
 @pytest.mark.parametrize("name", [" ", "two\nlines", "a" * 201, "\x00"])
