@@ -83,7 +83,8 @@ function Page({ model, detail, onDeleted }) {
 
   const act = useActions({ model, view, setLogged });
   const log = logged === null ? undefined : model.cells[logged];
-  const selected = view.selected === null ? undefined : model.cells[view.selected];
+  const at = view.selected === null ? undefined : model.cells[view.selected];
+  const selected = at?.role === "cell" ? at : undefined; // an address may name a reference, which is no picture of the grid
   return html`<div class="page experiment">
     <${Head} detail=${detail} experiment=${model.experiment} onDeleted=${onDeleted} />
     <${Findings} findings=${found} onCell=${(/** @type {number} */ position) => act.openAt(position)} onFilter=${(/** @type {string} */ q) => act.filter(q)} />
