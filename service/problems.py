@@ -15,9 +15,12 @@ from typing import Any
 
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from pydantic import ValidationError
+from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from jobs.errors import Conflict, DataDirectoryProblem, GridError, NotFound, WasDeleted
 from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, SceneError, UnknownName
@@ -119,11 +122,48 @@ def install(app: FastAPI) -> None:
     async def http(request: Request, error: HTTPException) -> JSONResponse:
         return of_http(request, error)
 
-    @app.exception_handler(Exception)
-    async def bug(request: Request, error: Exception) -> JSONResponse:
-        log.error("%s %s failed", request.method, request.url.path, exc_info=error)
-        detail = f"Dartboard has a bug: {type(error).__name__} (the server's log has more); nothing was lost"
-        return problem(request, "bug", "internal error", 500, detail)
+    @app.exception_handler(ClientDisconnect)
+    async def gone(request: Request, error: ClientDisconnect) -> Response:
+        return Response(status_code=400)  # nobody hears it
+
+    app.add_middleware(Net)
+
+
+class Net:
+    """
+    ASGI middleware: what no handler has seen becomes a problem document as well. That is a bug of ours, and what
+    the framework refuses in plain text: a range outside of a file.
+    """
+
+    def __init__(self, app: ASGIApp):
+        self.app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        if scope["type"] != "http":
+            await self.app(scope, receive, send)
+            return
+        request, status, replaced = Request(scope), 0, False
+
+        async def watch(message: Message) -> None:
+            nonlocal status, replaced
+            if message["type"] == "http.response.start":
+                status = message["status"]
+                headers = Headers(raw=message["headers"])
+                replaced = status >= 400 and headers.get("content-type", "").startswith("text/plain")
+                if replaced:
+                    told = {name: value for name, value in headers.items() if name == "content-range"}
+                    await of_http(request, HTTPException(status, headers=told))(scope, receive, send)
+            if not replaced:
+                await send(message)
+
+        try:
+            await self.app(scope, receive, watch)
+        except Exception as error:
+            if status:
+                raise  # half of an answer is out: to hang up is all that is left to say
+            log.error("%s %s failed", request.method, request.url.path, exc_info=error)
+            detail = f"Dartboard has a bug: {type(error).__name__} (the server's log has more); nothing was lost"
+            await problem(request, "bug", "internal error", 500, detail)(scope, receive, send)
 
 
 def sentences(errors: Sequence[Any]) -> str:

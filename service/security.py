@@ -2,9 +2,9 @@
 Who may talk to the server: browsers' requests from our own pages, and programs of this machine.
 
 A page of another site can make a browser send requests to 127.0.0.1, or point a name of its own there (DNS rebinding).
-So the Host must be a loopback name, and a request that changes something must come from our own origin, or from no
-page at all (curl, the command line). Off loopback every request needs the token. Answers tell the browser to load
-nothing from anywhere else.
+So the Host must be localhost or a loopback address, and a request that changes something must come from our own
+origin, or from no page at all (curl, the command line). Off loopback every request needs the token. Answers tell the
+browser to load nothing from anywhere else.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from renderer.errors import BadParameter
 from service.problems import problem
 
 SAFE = ("GET", "HEAD", "OPTIONS")
-NAMES = ("localhost", "127.0.0.1", "[::1]")
 TOKEN_LENGTH = 16  # characters, at least
 COOKIE = "dartboard_token"
 OPEN_PATHS = ("/api/health",)  # a container's health check has no token
@@ -83,7 +82,7 @@ class Guard:
 
     def _refusal(self, request: Request) -> Response | None:
         host = request.headers.get("host", "")
-        if self.token is None and _name(host) not in NAMES:
+        if self.token is None and not is_loopback(_name(host)):
             detail = f"the Host {host[:80]!r} is not this machine; open http://127.0.0.1 with the server's port"
             return problem(request, "foreign-host", "not for this server", 421, detail)
         if request.method not in SAFE and _foreign(request, host):
@@ -99,7 +98,8 @@ class Guard:
         given = query.pop("token", [""])[0]
         if given and hmac.compare_digest(given.encode(), self.token.encode()):
             rest = urlencode(query, doseq=True)
-            answer = RedirectResponse(request.url.path + (f"?{rest}" if rest else ""), 303)
+            path = "/" + request.url.path.lstrip("/")  # two slashes would lead to another host
+            answer = RedirectResponse(path + (f"?{rest}" if rest else ""), 303)
             answer.set_cookie(COOKIE, self.token, httponly=True, samesite="strict")
             return answer
         scheme, _, bearer = request.headers.get("authorization", "").partition(" ")

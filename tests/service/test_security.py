@@ -9,7 +9,7 @@ from service.security import check_token, is_loopback
 from tests.service.conftest import House, house_of, refusal
 
 TOKEN = "a token of more than sixteen characters"
-OURS = ["127.0.0.1", "127.0.0.1:8765", "localhost", "LOCALHOST:1", "[::1]", "[::1]:8000"]
+OURS = ["127.0.0.1", "127.0.0.1:8765", "127.0.0.2:1", "localhost", "LOCALHOST:1", "[::1]", "[::1]:8000"]
 FOREIGN = [
     "evil.example",
     "evil.example:8765",
@@ -17,6 +17,10 @@ FOREIGN = [
     "localhost.evil.example",
     "192.168.1.5",
     "[::2]",
+    "",
+    "127.0.0.1@evil.example",
+    "2130706433",
+    "0.0.0.0:8765",
 ]
 
 
