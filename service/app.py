@@ -24,14 +24,14 @@ from service import schemas
 from service.api import cells, events, experiments, scenes, server
 from service.engine import Engine
 from service.hub import Hub
-from service.pictures import Cache, Pictures
+from service.kept import Kept
+from service.pictures import Pictures
 from service.problems import RESPONSES, install, of_http
 from service.security import Guard
 
 WEB = Path(__file__).resolve().parent.parent / "web"
 PAGES = ("/", "/new", "/experiments/{experiment_id:int}")  # web/app.js shows the rest
 NOT_COMPRESSED = (*DEFAULT_EXCLUDED_CONTENT_TYPES, "application/octet-stream", "image/x-exr")
-ANSWER_BYTES = 2**25  # of curves that several pages ask for
 # Models that no route's type names: streams, the body that two content types share, problems.
 ALSO_TOLD = (schemas.Submission, schemas.Problem, schemas.Update, schemas.Overview, schemas.Progress)
 
@@ -66,7 +66,7 @@ def create(engine: Engine, hub: Hub, token: str | None = None) -> FastAPI:
         responses=RESPONSES,
     )  # fmt: skip
     app.state.engine, app.state.hub = engine, hub
-    app.state.pictures, app.state.answers = Pictures(engine.artifacts), Cache(ANSWER_BYTES)
+    app.state.pictures = Pictures(engine.artifacts)
     install(app)
     for module in (server, experiments, cells, scenes, events):
         app.include_router(module.router)
@@ -75,6 +75,7 @@ def create(engine: Engine, hub: Hub, token: str | None = None) -> FastAPI:
         app.get(path, include_in_schema=False)(_page)
     app.exception_handler(404)(_unknown)
     app.add_middleware(GZipMiddleware, minimum_size=1024, compresslevel=2, exclude_content_types=NOT_COMPRESSED)
+    app.add_middleware(Kept, revision=lambda: engine.moment.revision)
     app.add_middleware(Guard, token=token)
     app.openapi = lambda: _openapi(app)  # type: ignore[method-assign]
     return app
