@@ -7,6 +7,7 @@ its traceback, told without.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import re
 from collections.abc import Sequence
@@ -131,8 +132,8 @@ def install(app: FastAPI) -> None:
 
 class Net:
     """
-    ASGI middleware: what no handler has seen becomes a problem document as well. That is a bug of ours, and what
-    the framework refuses in plain text: a range outside of a file.
+    ASGI middleware: what no handler has seen becomes a problem document as well. That is a bug of ours, what the
+    framework refuses in plain text (a range outside of a file), and a request that the end of the server cuts off.
     """
 
     def __init__(self, app: ASGIApp):
@@ -158,6 +159,11 @@ class Net:
 
         try:
             await self.app(scope, receive, watch)
+        except asyncio.CancelledError:  # the server is ending and has waited long enough
+            if not status:
+                await problem(request, "ending", "the server is ending", 503, "ask again when it is back")(
+                    scope, receive, send
+                )
         except Exception as error:
             if status:
                 raise  # half of an answer is out: to hang up is all that is left to say
