@@ -15,9 +15,13 @@ from playwright.sync_api import Browser, sync_playwright
 from tests.e2e.browser import ARGUMENTS, SMALL, Server, Watch
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def chromium() -> Iterator[Browser]:
-    """Debian's Chromium, or the one in PATH. A developer may lack it, CI may not."""
+    """
+    Debian's Chromium, or the one in PATH. A developer may lack it, CI may not.
+
+    Playwright keeps an event loop running in the thread that uses it; tests that run a loop of their own come after it.
+    """
     path = shutil.which("chromium") or shutil.which("chromium-browser")
     if path is None:
         missing = "there is no chromium in PATH; `apt-get install chromium` runs these tests"

@@ -22,6 +22,7 @@ def test_a_deletion_can_be_undone(watch: Watch, empty: Server) -> None:
     number = empty.run(SMALL)
     page = watch.open(empty)
     other = watch.open(empty, f"/experiments/{number}")
+    watch.allow(rf"404 GET /api/experiments/{number}/(cells|convergence)\?")  # asked for just before it heard
     row = page.get_by_role("row").filter(has=page.get_by_role("link", name="small"))
     before = row.inner_text()
     row.get_by_role("button", name="Actions").click()
@@ -213,9 +214,7 @@ def test_every_page_can_be_read(watch: Watch, finished: Server, scheme: str, wid
             page.locator("#curves").scroll_into_view_if_needed()
             page.locator("#curves .points path").first.wait_for()
         for name in STATES:  # each in every place that shows one
-            page.evaluate(
-                "(name) => document.querySelectorAll('.state').forEach((one) => (one.dataset.state = name))", name
-            )
+            page.evaluate(TURN, name)
             faint.update({f"{path}: {text}": ratio for text, ratio in page.evaluate(CONTRAST) if ratio < 4.5})
         if page.evaluate("document.documentElement.scrollWidth > innerWidth"):
             wide.append(path)
@@ -245,6 +244,7 @@ CONTRAST = """() => {
     const [r, g, b] = rgb.map((c) => (c / 255 <= 0.04045 ? c / 255 / 12.92 : ((c / 255 + 0.055) / 1.055) ** 2.4));
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
   };
+  for (const one of document.getAnimations()) if (one.effect?.getComputedTiming().iterations !== Infinity) one.finish();
   const left = "svg, :disabled, [aria-disabled=true], [hidden], option, script, noscript";
   const found = [];
   for (const one of document.querySelectorAll("body *")) {
