@@ -1,10 +1,10 @@
 """
 Answers that are given again without asking a route: pages that show the same experiment ask the same in one moment.
 
-An answer is kept if it says how long it is true: for ever (``immutable``), or, with its header ``x-revision``, as long
-as the engine has not come further than that revision. Of equal requests that arrive together one is answered by its
-route, and the others with it. Bodies are kept as they travel, compressed or not. Pictures of an experiment that was
-deleted may be given for a while; no other cell ever has their address.
+An answer is kept if it says how long it is true: with its header ``x-revision`` as long as the engine has not come
+further than that revision, or ALWAYS. Who has it already, by its tag, is told just that. Of equal requests that arrive
+together one is answered by its route, and the others with it. Bodies are kept as they travel, compressed or not.
+Pictures of an experiment that was deleted may be given for a while; no other cell ever has their address.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ PATHS = ("/api/cells/", "/api/experiments/")
 ENDS = (".png", "/pixels", "/convergence")
 LARGEST_BYTES = 2**22  # of one answer: the curves of 10 000 cells
 KEPT_BYTES = 2**25
+ALWAYS = "*"  # as x-revision: true whatever happens
 
 Key = tuple[str, bytes, bool]
 
@@ -58,8 +59,7 @@ class Kept:
             if answer is not None and answer.revision < revision:
                 answer = None
         if answer is not None:
-            await send(answer.start)
-            await send({"type": "http.response.body", "body": answer.body})
+            await _give(answer, scope, send)
         elif key in self.making:  # a second one at the same time: what it makes is its own
             await self.app(scope, receive, send)
         else:
@@ -132,7 +132,19 @@ def _holds_until(start: Message) -> float | None:
     if start["status"] != 200:
         return None
     headers = dict(start["headers"])
-    if b"immutable" in headers.get(b"cache-control", b""):
-        return math.inf
     revision = headers.get(b"x-revision")
-    return None if revision is None else int(revision)
+    if revision is None:
+        return None
+    return math.inf if revision == ALWAYS.encode() else int(revision)
+
+
+async def _give(answer: Answer, scope: Scope, send: Send) -> None:
+    headers = answer.start["headers"]
+    tag = dict(headers).get(b"etag")
+    if tag is not None and any(name == b"if-none-match" and tag in value for name, value in scope["headers"]):
+        rest = [(name, value) for name, value in headers if name not in (b"content-length", b"content-type")]
+        await send({"type": "http.response.start", "status": 304, "headers": rest})
+        await send({"type": "http.response.body", "body": b""})
+    else:
+        await send(answer.start)
+        await send({"type": "http.response.body", "body": answer.body})

@@ -1,17 +1,20 @@
 """
 Pictures of cells for browsers: previews, error maps, float16 rows. Made when asked for, the last ones kept in memory.
 
-A finished replicate never changes, so whatever is made of it may be kept for ever; a picture that is still being drawn
-is read from the small file that its render process writes.
+A finished replicate never changes, and its file has the digest of its cell for a name: so whatever is made of it has a
+tag that tells it from anything else, in any data directory. A picture that is still being drawn is read from the small
+file that its render process writes, and has none.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,6 +23,7 @@ from numpy.typing import NDArray
 from jobs.artifacts import Artifacts
 from jobs.errors import NotFound
 from jobs.store import Row, Store
+from renderer import __version__
 from renderer.errors import BadParameter, UnknownName
 from renderer.images import read_picture
 from renderer.metrics import METRICS, Reference
@@ -71,6 +75,21 @@ class Cache:
         return value
 
 
+@dataclass(frozen=True)
+class Made:
+    """
+    A picture in the form that was asked for.
+
+    tag      of what it is made of: equal tags, equal pictures. None: it changes any moment
+    fixed    its address never shows anything else; False for means, which grow, and for what is compared with one
+    make     its bytes
+    """
+
+    tag: str | None
+    fixed: bool
+    make: Callable[[], bytes]
+
+
 class Pictures:
     """The pictures of one data directory."""
 
@@ -80,9 +99,9 @@ class Pictures:
 
     def preview(
         self, store: Store, cell: int, role: str, k: str, *, size: int, ev: float, tone: str, maximum: float
-    ) -> tuple[bytes, bool]:
+    ) -> Made:
         """
-        A tone-mapped PNG, and whether it is final. Of a replicate that is not finished, what is drawn so far.
+        A tone-mapped PNG. Of a replicate that is not finished, what is drawn so far.
 
         Raises ``NotFound`` while there is nothing to see.
         """
@@ -93,15 +112,16 @@ class Pictures:
             partial = self._partial(store, cell)
             if partial is None:
                 raise
-            return preview_png(shrink(partial, size), ev=ev, tone=tone, maximum=maximum), False
+            shown = shrink(partial, size)
+            return Made(None, False, lambda: preview_png(shown, ev=ev, tone=tone, maximum=maximum))
         key = (names, size, ev, tone, maximum)
-        return self.png.get(
-            key, lambda: preview_png(self._shrunk(names, size), ev=ev, tone=tone, maximum=maximum)
-        ), k != MEAN  # fmt: skip
 
-    def error(
-        self, store: Store, cell: int, metric: str, reference: int, k: str, *, size: int, maximum: float
-    ) -> bytes:
+        def make() -> bytes:
+            return preview_png(self._shrunk(names, size), ev=ev, tone=tone, maximum=maximum)
+
+        return Made(_tag(key), k != MEAN, lambda: self.png.get(key, make))
+
+    def error(self, store: Store, cell: int, metric: str, reference: int, k: str, *, size: int, maximum: float) -> Made:
         """The map of a metric as a PNG, from 0 to ``maximum``. Raises ``NotFound`` while nothing can be compared."""
         if metric not in METRICS:
             raise UnknownName("metric", metric, "", METRICS)
@@ -110,6 +130,7 @@ class Pictures:
         halves = [tuple(row["image"] for row in self._rows(store, reference, "reference")[part::2]) for part in (0, 1)]
         if not all(halves):
             raise NotFound(f"reference {reference} is not finished yet; there is nothing to compare with")
+        key = (names, metric, METRICS[metric].version, *halves, size, maximum)
 
         def make() -> bytes:
             against = Reference(self._mean(halves[0]), self._mean(halves[1]))
@@ -118,13 +139,14 @@ class Pictures:
                 raise BadParameter(f"cell {cell} and reference {reference} differ in size: nothing can be compared")
             return error_png(shrink(METRICS[metric].error_map(picture, against), size), maximum)
 
-        return self.png.get((names, metric, *halves, size, maximum), make)
+        return Made(_tag(key), False, lambda: self.png.get(key, make))
 
-    def pixels(self, store: Store, cell: int, role: str, k: str, size: int | None) -> tuple[int, int, bytes]:
+    def pixels(self, store: Store, cell: int, role: str, k: str, size: int | None) -> tuple[int, int, Made]:
         """Width, height and float16 RGB rows from the top."""
         names = self._names(store, cell, role, k)
         picture = self._mean(names) if size is None else self._shrunk(names, size)
-        return picture.shape[1], picture.shape[0], to_half(picture).tobytes()
+        made = Made(_tag((names, size)), k != MEAN, lambda: to_half(picture).tobytes())
+        return picture.shape[1], picture.shape[0], made
 
     def file(self, store: Store, cell: int, role: str, k: int) -> str:
         """The EXR file of a replicate, relative to the data directory."""
@@ -172,6 +194,11 @@ class Pictures:
                 loaded = np.load(self.artifacts.preview(known["digest"]), allow_pickle=False)
                 return np.asarray(loaded, np.float32)
         return None
+
+
+def _tag(key: object) -> str:
+    """A short name of what a picture is made of, and by which Dartboard."""
+    return hashlib.sha256(repr((__version__, key)).encode()).hexdigest()[:32]
 
 
 def _check_size(size: int) -> None:

@@ -2971,7 +2971,7 @@ export interface operations {
                 tone?: string;
                 /** @description what the top of a scale means */
                 max?: number;
-                /** @description ignored: makes a URL that a browser may keep */
+                /** @description ignored: it only makes an address another one */
                 v?: string;
             };
             header?: never;
@@ -2991,6 +2991,13 @@ export interface operations {
                 content: {
                     "image/png": unknown;
                 };
+            };
+            /** @description the client has it: its `If-None-Match` names it */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description the token is missing */
             401: {
@@ -3086,6 +3093,8 @@ export interface operations {
                 size?: "64" | "128" | "256" | "512";
                 /** @description what the top of a scale means */
                 max?: number;
+                /** @description ignored: it only makes an address another one */
+                v?: string;
             };
             header?: never;
             path: {
@@ -3105,6 +3114,13 @@ export interface operations {
                 content: {
                     "image/png": unknown;
                 };
+            };
+            /** @description the client has it: its `If-None-Match` names it */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description the token is missing */
             401: {
@@ -3196,7 +3212,7 @@ export interface operations {
                 /** @description the number of a replicate, or `mean` */
                 k?: string;
                 size?: number | null;
-                /** @description ignored: makes a URL that a browser may keep */
+                /** @description ignored: it only makes an address another one */
                 v?: string;
             };
             header?: never;
@@ -3216,6 +3232,13 @@ export interface operations {
                 content: {
                     "application/octet-stream": unknown;
                 };
+            };
+            /** @description the client has it: its `If-None-Match` names it */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description the token is missing */
             401: {

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from service import kept
-from service.kept import Kept
+from service.kept import ALWAYS, Kept
 
-FOR_EVER = [(b"cache-control", b"private, max-age=31536000, immutable")]
+FOR_EVER = [(b"x-revision", ALWAYS.encode()), (b"etag", b'"tag"')]
 PICTURE, CURVES = "/api/cells/7/preview.png", "/api/experiments/1/convergence"
 
 
@@ -29,16 +29,23 @@ class Route:
         await send({"type": "http.response.body", "body": answer[3:]})
 
 
-async def ask(app: Kept, path: str = PICTURE, query: bytes = b"", method: str = "GET", gzip: bool = False) -> bytes:
+async def ask(
+    app: Kept, path: str = PICTURE, query: bytes = b"", method: str = "GET", gzip: bool = False, has: bytes = b""
+) -> bytes:
     said: list[Any] = []
 
     async def send(message: Any) -> None:
         said.append(message)
 
     headers = [(b"accept-encoding", b"gzip, br")] if gzip else []
+    if has:
+        headers.append((b"if-none-match", has))
     scope = {"type": "http", "method": method, "path": path, "query_string": query, "headers": headers}
     await app(scope, None, send)  # type: ignore[arg-type]
     assert said[0]["type"] == "http.response.start"
+    if said[0]["status"] == 304:
+        assert b"content-length" not in dict(said[0]["headers"])
+        return b"304" + b"".join(message["body"] for message in said[1:])
     return b"".join(message["body"] for message in said[1:])
 
 
@@ -48,6 +55,13 @@ def test_a_picture_that_never_changes_is_made_once() -> None:
     assert {asyncio.run(ask(app)) for _ in range(3)} == {b"picture 1"}
     assert asyncio.run(ask(app, query=b"ev=1")) == b"picture 2"
     assert asyncio.run(ask(app, gzip=True)) == b"picture 3"
+
+
+def test_who_has_it_already_is_told_just_that() -> None:
+    app = Kept(Route(FOR_EVER), lambda: 0)
+    assert asyncio.run(ask(app)) == b"picture 1"
+    assert asyncio.run(ask(app, has=b'"tag"')) == asyncio.run(ask(app, has=b'"other", W/"tag"')) == b"304"
+    assert asyncio.run(ask(app, has=b'"other"')) == b"picture 1"
 
 
 def test_fifty_who_ask_at_once_get_one_answer() -> None:

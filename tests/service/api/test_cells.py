@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,9 @@ from renderer.images import read_picture
 from renderer.metrics import METRICS, Reference
 from renderer.previews import error_png, preview_png, to_half
 from service import schemas
-from tests.service.conftest import House, answer, refusal
+from service.engine import Engine
+from service.hub import Hub
+from tests.service.conftest import PAINT, House, answer, house_of, refusal
 
 WIDTH, HEIGHT = 16, 12
 
@@ -77,12 +80,62 @@ def test_a_picture_comes_as_the_file_that_was_rendered(house: House, finished: d
     assert "attachment" in response.headers["content-disposition"]
 
 
-def test_only_what_never_changes_may_be_kept(house: House, finished: dict[str, schemas.Cell]) -> None:
-    cell = finished["cell"].cell
-    for query, kept in (({"v": "1"}, True), ({}, False), ({"k": "mean", "v": "1"}, False)):
-        caching = house.client.get(f"/api/cells/{cell}/preview.png", params=query).headers["cache-control"]
-        assert ("immutable" in caching) is kept, (query, caching)
-    assert "immutable" in house.client.get(f"/api/cells/{cell}/pixels").headers["cache-control"]
+ADDRESSES = [
+    "preview.png", "preview.png?k=1&v=done", "preview.png?k=mean", "preview.png?ev=2", "pixels", "pixels?k=mean",
+    "pixels?size=16", "error/mse.png?reference={reference}", "error/mse.png?reference={reference}&k=mean&max=2",
+    "error/relmse.png?reference={reference}",
+]  # fmt: skip
+
+
+def test_a_browser_asks_again_and_is_told_that_it_has_it(house: House, finished: dict[str, schemas.Cell]) -> None:
+    """
+    The same address shows another picture when another data directory is served, or when a mean has grown: nothing is
+    kept without asking, and what is asked for again does not travel again.
+    """
+    tags = set()
+    for address in ADDRESSES:
+        path = f"/api/cells/{finished['cell'].cell}/" + address.format(reference=finished["reference"].cell)
+        first = house.client.get(path)
+        assert first.headers["cache-control"] == "private, no-cache"
+        for _ in range(2):
+            again = house.client.get(path, headers={"if-none-match": first.headers["etag"]})
+            assert (again.status_code, again.content) == (304, b"")
+            assert again.headers["etag"] == first.headers["etag"]
+        other = house.client.get(path, headers={"if-none-match": '"other"'})
+        assert (other.status_code, other.content) == (200, first.content)
+        tags.add(first.headers["etag"])
+    assert len(tags) == len(ADDRESSES), "different pictures, different tags"
+
+
+def test_a_picture_of_another_data_directory_has_another_tag(
+    house: House, finished: dict[str, schemas.Cell], tmp_path: Path
+) -> None:
+    """Cell 1 there is not cell 1 here, at the very same address."""
+    here = house.client.get("/api/cells/1/pixels")
+    engine = Engine(tmp_path / "other", PAINT, on_change=house.watch.poke)
+    engine.start()
+    there = house_of(engine, house.painter, house.watch, Hub())
+    there.submit(samplers=["independent"], spp=[9])
+    there.finish(1)
+    answer = there.client.get("/api/cells/1/pixels", headers={"if-none-match": here.headers["etag"]})
+    engine.stop()
+    assert answer.status_code == 200
+    assert answer.content != here.content
+
+
+def test_a_reference_that_grows_changes_what_is_made_of_it(house: House, finished: dict[str, schemas.Cell]) -> None:
+    """Another experiment wants more of it: its mean and the error maps are new, the first pictures are not."""
+    cell, reference = finished["cell"].cell, finished["reference"].cell
+    paths = {
+        "mean": f"/api/cells/{reference}/preview.png?role=reference",
+        "error": f"/api/cells/{cell}/error/mse.png?reference={reference}",
+        "first": f"/api/cells/{reference}/preview.png?role=reference&k=0",
+    }
+    before = {name: house.client.get(path).headers["etag"] for name, path in paths.items()}
+    house.submit(name="more", samplers=["independent"], spp=[4], reference={"spp": 64, "replicates": 4})
+    house.finish(2)
+    after = {name: house.client.get(path).headers["etag"] for name, path in paths.items()}
+    assert {name for name in paths if before[name] != after[name]} == {"mean", "error"}
 
 
 def test_while_nothing_is_finished_what_is_drawn_so_far_is_shown(house: House) -> None:
