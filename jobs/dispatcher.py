@@ -199,6 +199,7 @@ class Dispatcher:
                     kind = "requeued"
         if isinstance(event, (Done, Failed, Released)):
             del self.under_way[event.order]
+            self.artifacts.preview(work.digest).unlink(missing_ok=True)
             self.cancelled.discard(event.order)
         self.on_news(News(kind, work, event, state))
 

@@ -116,7 +116,6 @@ class RenderProcess:
                 )
             self.tell("replicate", order=order["order"], role=role, k=k, file=file.name, seed=rendering.seed,
                       threads=self.threads, **timing)  # fmt: skip
-        previews.end()
 
     def load(self, folder: Path, main: str, spec: Any) -> Any:
         """The scene as the estimand sees it: the one that is loaded, or a new one in its place."""
@@ -141,7 +140,8 @@ class RenderProcess:
 class Previews:
     """
     A small file that refines while a cell renders: the first replicate so far as a float16 array (H, W, 3) of at most
-    PREVIEW_SIDE pixels a side, replaced in one step, gone at the end. Whoever shows it does the tone mapping.
+    PREVIEW_SIDE pixels a side, replaced in one step. Whoever shows it does the tone mapping, and the dispatcher
+    removes it: a page may still ask for it while the finished picture is moved into place.
     """
 
     def __init__(self, path: str | None):
@@ -162,10 +162,6 @@ class Previews:
         temporary.replace(self.path)
         self.last = time.monotonic()
         self.count += 1
-
-    def end(self) -> None:
-        if self.path is not None:
-            self.path.unlink(missing_ok=True)
 
 
 def explain(error: Exception) -> tuple[str, str]:

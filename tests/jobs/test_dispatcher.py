@@ -18,7 +18,7 @@ from jobs import experiments, grid, plan, points, queue, results
 from jobs.artifacts import Artifacts
 from jobs.dispatcher import Dispatcher, News
 from jobs.errors import DataDirectoryProblem
-from jobs.executors.base import DISK_FULL, Event, Failed, Started
+from jobs.executors.base import DISK_FULL, Event, Failed, Finished, Started
 from jobs.executors.local import LocalExecutor
 from jobs.queue import MAX_ATTEMPTS
 from jobs.render_process import explain
@@ -216,3 +216,20 @@ def test_stop_from_a_task_gives_everything_back(store: Store, artifacts: Artifac
     painted(store, artifacts, again).run()
     assert experiments.standing(store, experiment.id).state == "done"
     assert not set(painter.drawn) & set(again.drawn)
+
+
+def test_a_preview_stays_until_the_finished_picture_is_in_its_place(store: Store, artifacts: Artifacts) -> None:
+    """Whoever asks in between sees one of the two; when the cell is done, nothing is left."""
+    submit(store)
+    there = []
+
+    def hear(news: News) -> None:
+        preview = artifacts.preview(news.work.digest)
+        if isinstance(news.event, Started):
+            preview.write_bytes(b"what is drawn so far")
+        elif isinstance(news.event, Finished):
+            there.append(preview.exists())
+
+    Dispatcher(store, artifacts, Painter(), machine="here", device="llvm", on_news=hear).run()
+    assert there and all(there)
+    assert not list(artifacts.previews.iterdir())
