@@ -37,7 +37,7 @@ Change = Callable[[Store, Dispatcher], T]
 RETRY_SECONDS = 10.0  # after a stall
 CHANGE_SECONDS = 60.0  # longest wait for a change: a grid of 100 000 cells takes 5 s on a slow disk
 CLEANING_SECONDS = 60.0  # between two looks into the trash
-MEMORY = 0.8  # of the rate of drawing: what a new picture leaves of the old estimate
+MEMORY = 0.9  # of the rate of drawing: what a new picture leaves of the samples and seconds of those before it
 ENDING = "the server is ending; start it again with `dartboard up` and ask once more"
 
 log = logging.getLogger("dartboard")
@@ -97,6 +97,7 @@ class Engine:
         self.opened: Future[None] = Future()
         self.thread = threading.Thread(target=self._run, name="engine", daemon=True)
         self.cleaned = 0.0
+        self.samples = self.seconds = 0.0  # of the last pictures, see MEMORY
 
     def start(self) -> None:
         """Raises ``DataDirectoryProblem`` if the data directory cannot be opened."""
@@ -259,9 +260,10 @@ class Engine:
                 return
             case Finished() as finished:
                 width, height = news.work.spec.estimand.size
-                seconds = finished.render_seconds + finished.compile_seconds
-                now = width * height * news.work.spec.spp / max(seconds, 1e-3)
-                rate = now if rate is None else 1 / (MEMORY / rate + (1 - MEMORY) / now)
+                seconds = max(finished.render_seconds + finished.compile_seconds, 1e-3)
+                self.samples = MEMORY * self.samples + width * height * news.work.spec.spp
+                self.seconds = MEMORY * self.seconds + seconds
+                rate = self.samples / self.seconds  # of sums: a large picture tells more than a small one
             case Done() | Failed() | Released() as last:
                 if isinstance(last, Failed):
                     log.warning("%s: %s", last.error_class, last.message)
