@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Sequence
@@ -24,11 +25,12 @@ from jobs.artifacts import Artifacts
 from jobs.errors import NotFound
 from jobs.store import Row, Store
 from renderer import __version__
-from renderer.errors import BadParameter, UnknownName
+from renderer.errors import BadParameter, DartboardError, UnknownName
 from renderer.images import read_picture
 from renderer.metrics import METRICS, Reference
 from renderer.previews import error_png, preview_png, shrink, to_half
 
+log = logging.getLogger("dartboard")
 T = TypeVar("T", bytes, NDArray[np.float32])
 Floats = NDArray[np.float32]
 
@@ -176,15 +178,22 @@ class Pictures:
         """The mean of pictures, float32."""
 
         def make() -> Floats:
-            total = read_picture(self.artifacts.path(names[0]))
+            total = self._read(names[0])
             if len(names) == 1:
                 return total
             whole = total.astype(np.float64)
             for name in names[1:]:
-                whole += read_picture(self.artifacts.path(name))
+                whole += self._read(name)
             return np.asarray(whole / len(names), np.float32)
 
         return self.decoded.get(tuple(names), make)
+
+    def _read(self, name: str) -> Floats:
+        try:
+            return read_picture(self.artifacts.path(name))
+        except DartboardError as error:
+            log.warning("a picture cannot be shown: %s", error)
+            raise NotFound(f"the picture {name} cannot be shown: its file is gone or damaged") from None
 
     def _partial(self, store: Store, cell: int) -> Floats | None:
         """What a render process has drawn so far of a cell, None where it shows nothing yet."""

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.concurrency import run_in_threadpool
-from fastapi.responses import StreamingResponse
 
 from jobs import cells as cell_views
 from jobs import experiments, queue, results, trash
@@ -56,7 +54,7 @@ async def submit(
     request: Request,
     engine: EngineDep,
     dry_run: bool = False,
-    idempotency_key: Annotated[str | None, Header(max_length=200)] = None,
+    idempotency_key: Annotated[str | None, Header(min_length=1, max_length=200)] = None,
 ) -> Response:
     """
     Submit a grid: 201 for a new experiment, 200 for one that was there (a cancelled one is wanted again).
@@ -156,16 +154,16 @@ def show_convergence(
 
 
 @router.get("/{experiment_id}/results.csv", response_class=Response, responses={200: {"content": {"text/csv": {}}}})
-def results_csv(engine: EngineDep, found: ExperimentDep) -> StreamingResponse:
+def results_csv(store: StoreDep, found: ExperimentDep) -> Response:
     """One row per replicate with every metric, as `dartboard results --format csv`."""
-    return _export(engine, found, "csv")
+    return _export(store, found, "csv", "text/csv; charset=utf-8")
 
 
 @router.get("/{experiment_id}/results.json", response_class=Response,
             responses={200: {"content": {"application/json": {}}}})  # fmt: skip
-def results_json(engine: EngineDep, found: ExperimentDep) -> StreamingResponse:
+def results_json(store: StoreDep, found: ExperimentDep) -> Response:
     """The same as JSON."""
-    return _export(engine, found, "json")
+    return _export(store, found, "json", "application/json")
 
 
 @router.get("/{experiment_id}/report", response_class=Response, responses={200: {"content": {"text/html": {}}}})
@@ -215,19 +213,13 @@ def _submit(engine: Engine, asked: schemas.Submission, key: str | None) -> Respo
     return answer
 
 
-def _export(engine: Engine, found: Experiment, form: str) -> StreamingResponse:
-    """A file that is read from the database as it is sent."""
-
-    def chunks() -> Iterator[str]:
-        with engine.readers.lend() as store:
-            file = io.StringIO()
-            write = results.write_csv if form == "csv" else results.write_json
-            write(results.rows(store, found.id), file)
-            yield file.getvalue()
-
+def _export(store: Store, found: Experiment, form: str, media_type: str) -> Response:
+    file = io.StringIO(newline="")
+    write = results.write_csv if form == "csv" else results.write_json
+    with store.moment():
+        write(results.rows(store, found.id), file)
     name = f'attachment; filename="dartboard-{found.id}.{form}"'
-    media_type = "text/csv; charset=utf-8" if form == "csv" else "application/json"
-    return StreamingResponse(chunks(), media_type=media_type, headers={"content-disposition": name})
+    return Response(file.getvalue(), media_type=media_type, headers={"content-disposition": name})
 
 
 def _json(value: Any, status: int = 200) -> Response:

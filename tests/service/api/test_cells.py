@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from jobs import queue
+from jobs.dispatcher import Dispatcher
 from jobs.store import Store
 from renderer.images import read_picture
 from renderer.metrics import METRICS, Reference
@@ -185,6 +188,46 @@ def test_a_replicate_that_nobody_wanted_and_a_metric_that_nobody_knows(
     refusal(house.client.get(f"/api/cells/{cell}/pixels?k=2"), 404)
     refusal(house.client.get(f"/api/cells/{cell}/error/psnr.png?reference={reference}"), 422, "unknown-name")
     refusal(house.client.get(f"/api/cells/{cell}/error/mse.png?reference={cell}"), 404)
+
+
+@pytest.mark.parametrize(
+    "damage", [Path.unlink, lambda path: path.write_bytes(b"half a file")], ids=["gone", "damaged"]
+)
+def test_a_picture_whose_file_is_gone_says_so(
+    house: House, finished: dict[str, schemas.Cell], damage: Callable[[Path], object]
+) -> None:
+    """Somebody tidied up in the data directory: a sentence without its path, and all else is still shown."""
+    cell, reference = finished["cell"].cell, finished["reference"].cell
+    with house.engine.readers.lend() as store:
+        path = house.artifacts.path(store.rows("images", cell_id=cell, role="cell")[0]["image"])
+    damage(path)
+    for form in ("preview.png", "pixels", f"error/mse.png?reference={reference}", "preview.png?k=mean"):
+        detail = refusal(house.client.get(f"/api/cells/{cell}/{form}"), 404, "not-found").detail
+        assert "gone or damaged" in detail and str(house.artifacts.data) not in detail
+    assert house.client.get(f"/api/cells/{cell}/preview.png?k=1").status_code == 200
+    assert answer(house.client.get("/api/experiments/1/cells"), schemas.Cells).cells[0].metrics
+
+
+def test_the_log_of_a_try_that_failed(house: House) -> None:
+    """The last words of its render process, or that they are gone."""
+    house.painter.allowed = 0
+    house.submit(samplers=["independent"], spp=[4], reference=False)
+
+    def fail(store: Store, dispatcher: Dispatcher) -> None:
+        (work,) = dispatcher.under_way.values()
+        kept = dispatcher.artifacts.write_log(work.attempt_id, "the last words")
+        queue.fail(store, work, "nan_output", "3 pixels are NaN", kept)
+
+    house.watch.until(lambda: house.engine.moment.drawing)
+    house.do(fail)
+    (tried,) = answer(house.client.get("/api/cells/1/attempts"), schemas.Attempts).attempts
+    assert (tried.outcome, tried.error, tried.log) == ("nan_output", "3 pixels are NaN", "the last words")
+    (cell,) = answer(house.client.get("/api/experiments/1/cells"), schemas.Cells).cells
+    assert (cell.state, cell.error_class, cell.error) == ("failed", "nan_output", "3 pixels are NaN")
+    for log in house.artifacts.logs.iterdir():
+        log.unlink()
+    (tried,) = answer(house.client.get("/api/cells/1/attempts"), schemas.Attempts).attempts
+    assert tried.log == "(the log is gone)"
 
 
 def test_the_history_of_a_cell(house: House, finished: dict[str, schemas.Cell]) -> None:

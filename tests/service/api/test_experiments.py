@@ -30,7 +30,7 @@ def post(house: House, path: str) -> schemas.Experiment:
 
 
 def submit(house: House, key: str | None = None, **keys: Any):
-    headers = {"idempotency-key": key} if key else {}
+    headers = {} if key is None else {"idempotency-key": key}
     return house.client.post("/api/experiments", json={"grid": {**GRID, **keys}}, headers=headers)
 
 
@@ -154,6 +154,13 @@ def test_a_key_makes_a_request_that_may_be_sent_again(house: House) -> None:
     assert house.count("experiment") == 1
     answer(submit(house, spp=[4]), schemas.Experiment)  # without a key it is wanted again
     assert house.until_state(1, "done")
+
+
+@pytest.mark.parametrize("key", ["", "k" * 201])
+def test_a_key_that_names_nothing_is_refused(house: House, key: str) -> None:
+    """An empty one would be the same for everybody."""
+    refusal(submit(house, key=key), 422, "bad-request")
+    assert house.count("experiment") == 0
 
 
 def test_experiments_are_found_by_name_newest_first(house: House) -> None:
