@@ -105,6 +105,7 @@ class Measurer:
         ]  # fmt: skip
         with self.store.transaction():
             self.store.run_many("add_floor", rows)
+            self.store.insert("add_event", at=now(), what="measure", cell_id=None, experiment_id=None)  # it is news
 
     def _search(self) -> None:
         """One page of the cells of one reference."""

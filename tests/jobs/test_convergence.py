@@ -119,6 +119,22 @@ def test_one_point_under_other_conditions_is_enough(store):
     assert alike == {"independent": False, "stratified": True}
 
 
+def test_the_noise_of_a_reference_is_news_when_it_is_measured(store, artifacts):
+    """Nothing else may change with it: who has read the curves before has to read them again."""
+    found, _ = painted(store, artifacts, Painter()).submit(planned(spp=[1, 2, 4]))
+    painted(store, artifacts, Painter()).run()
+    store.connection.execute("delete from floor")
+    assert {curve.floor for curve in convergence.curves(store, found.id, "mse")} == {None}
+    seen = store.revision()
+    dispatcher = painted(store, artifacts, Painter())
+    dispatcher.run()
+    assert store.revision() > seen
+    assert all(curve.floor for curve in convergence.curves(store, found.id, "mse"))
+    seen = store.revision()
+    dispatcher.run()
+    assert store.revision() == seen
+
+
 def test_an_unknown_metric_is_told_with_those_that_are_known(store):
     experiment = submit(store)
     with pytest.raises(UnknownName, match="unknown metric 'rmse'; known: .*relmse.*did you mean '.*mse'"):
