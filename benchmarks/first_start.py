@@ -80,18 +80,8 @@ def until_first_picture(folder: Path, grid: str) -> tuple[float | None, list[tup
     """Seconds from the command to its first picture file, and each line it said with the second it said it."""
     data = folder / "data"
     shutil.rmtree(data, ignore_errors=True)
-    kept = {name: value for name, value in os.environ.items() if name.startswith(("PIP_", "http", "HTTP"))}
-    environment = {
-        **kept, "HOME": str(folder / "home"), "PATH": "/usr/local/bin:/usr/bin:/bin", "DARTBOARD_LLVM": "unpack",
-    }  # fmt: skip
-    as_user: dict[str, Any] = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
-    checkout = folder / "checkout"
     started = time.monotonic()
-    process = subprocess.Popen(
-        [str(checkout / "dartboard"), "run", grid, "--data", str(data)],
-        cwd=checkout, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
-        start_new_session=True, **as_user,
-    )  # fmt: skip
+    process = start(folder, "run", grid, "--data", str(data))
     said: list[tuple[float, str]] = []
 
     def listen() -> None:
@@ -116,6 +106,20 @@ def until_first_picture(folder: Path, grid: str) -> tuple[float | None, list[tup
             process.wait()
     listener.join(5)
     return picture, said
+
+
+def start(folder: Path, *words: str) -> subprocess.Popen[str]:
+    """``./dartboard WORDS`` in a bare checkout, as somebody with an empty home; what it says comes on stderr."""
+    kept = {name: value for name, value in os.environ.items() if name.startswith(("PIP_", "http", "HTTP"))}
+    environment = {
+        **kept, "HOME": str(folder / "home"), "PATH": "/usr/local/bin:/usr/bin:/bin", "DARTBOARD_LLVM": "unpack",
+    }  # fmt: skip
+    as_user: dict[str, Any] = {"user": NOBODY, "group": NOBODY, "extra_groups": []} if os.geteuid() == 0 else {}
+    checkout = folder / "checkout"
+    return subprocess.Popen(
+        [str(checkout / "dartboard"), *words], cwd=checkout, env=environment, stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True, start_new_session=True, **as_user,
+    )  # fmt: skip
 
 
 def phases(start: str, said: list[tuple[float, str]]) -> list[tuple[str, float, float | None]]:

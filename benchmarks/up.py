@@ -1,0 +1,94 @@
+"""
+How long a stranger waits for the dashboard: from a bare checkout to a picture on the page, and on the second day.
+
+    python -m benchmarks.up
+
+The checkout is bare as in benchmarks/first_start.py: no `.venv`, an empty HOME, LLVM unpacked anew. A browser is open
+already and asks for the demo experiment's page until it answers; what counts is a thumbnail that is decoded and on
+screen. The second start has everything, the data too: what counts is the list, and the experiment's page with its
+pictures and its tools.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from playwright.sync_api import Error, Page
+
+from benchmarks.browser import PICTURE, chromium, free_port, opened
+from benchmarks.first_start import bare_checkout, phases, start
+
+FIRST_GOAL_SECONDS, SECOND_GOAL_SECONDS = 180.0, 3.0  # what issue 3 asks for
+LIMIT_SECONDS = 600.0
+POLL_SECONDS = 0.05
+DECODED = "() => [...document.querySelectorAll('" + PICTURE + "')].some((one) => one.complete && one.naturalWidth > 0)"
+
+
+def main() -> int:
+    rows: list[tuple[str, float, float | None]] = []
+    with bare_checkout() as folder, chromium() as browser:
+        port = free_port()
+        for name in ("first", "second"):
+            with opened(browser) as page:
+                started = time.monotonic()
+                process = start(folder, "up", "--port", str(port), "--data", str(folder / "data"))
+                said = listen(process, started)
+                address = f"http://127.0.0.1:{port}"
+                if name == "second":
+                    rows.append(("second start: list usable", shown(page, address, "main a", started, process), None))
+                picture = shown(page, f"{address}/experiments/1", PICTURE, started, process)
+                goal = FIRST_GOAL_SECONDS if name == "first" else SECOND_GOAL_SECONDS
+                rows += phases(name, said)
+                rows.append((f"{name} start: picture on the page", picture, goal))
+            print(f"--- {name} start said:\n" + "".join(f"{at:7.2f} s  {line}\n" for at, line in said))
+            end(process)
+    print(f"{'phase':<42}{'seconds':>9}{'goal':>8}")
+    for label, seconds, limit in rows:
+        print(f"{label:<42}{seconds:>9.2f}" + (f"{limit:>8.0f}" if limit else ""))
+    return 0
+
+
+def listen(process: subprocess.Popen[str], started: float) -> list[tuple[float, str]]:
+    """Each line that the start says, with the second at which it says it; grows while it speaks."""
+    said: list[tuple[float, str]] = []
+
+    def hear() -> None:
+        for line in process.stderr or ():
+            said.append((time.monotonic() - started, re.sub(r"/\S+/", "", line.rstrip())))
+
+    threading.Thread(target=hear, daemon=True).start()
+    return said
+
+
+def shown(page: Page, address: str, selector: str, started: float, process: subprocess.Popen[str]) -> float:
+    """Seconds until the page at an address shows what is asked for; it is opened again until the server is there."""
+    while time.monotonic() - started < LIMIT_SECONDS and process.poll() is None:
+        try:
+            page.goto(address, wait_until="commit")
+            break
+        except Error:
+            time.sleep(POLL_SECONDS)
+    while time.monotonic() - started < LIMIT_SECONDS and process.poll() is None:
+        if page.evaluate(DECODED) if selector == PICTURE else page.locator(selector).count():
+            return time.monotonic() - started
+        time.sleep(POLL_SECONDS)
+    raise SystemExit(f"{address} never showed {selector}; the server ended with {process.poll()}")
+
+
+def end(process: subprocess.Popen[str]) -> None:
+    process.send_signal(signal.SIGTERM)
+    try:
+        process.wait(20)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+if __name__ == "__main__":
+    sys.exit(main())
