@@ -298,10 +298,12 @@ delete from experiment where id = :experiment_id;
 -- Points -----------------------------------------------------------------------------------------------------------
 
 -- name: refresh_errors
+-- Eight digits of a mean and four of its error: with seventeen, the cells of a large grid take twice as long to send.
 insert or replace into point (experiment_id, position, name, version, n, mean, error)
 select
-    experiment_id, position, name, version, count(*), avg(value),
-    case when count(*) > 1 then sqrt(sum((value - middle) * (value - middle)) / (count(*) - 1) / count(*)) end
+    experiment_id, position, name, version, count(*), cast(printf('%.8g', avg(value)) as real),
+    case when count(*) > 1 then cast(
+        printf('%.4g', sqrt(sum((value - middle) * (value - middle)) / (count(*) - 1) / count(*))) as real) end
 from (
     select wanted.experiment_id, wanted.position, metric.name, metric.version, metric.value,
         avg(metric.value) over (partition by wanted.experiment_id, wanted.position, metric.name) as middle
@@ -323,7 +325,8 @@ group by experiment_id, position, name;
 -- name: refresh_seconds
 insert or replace into point (experiment_id, position, name, version, n, mean, conditions)
 select
-    wanted.experiment_id, wanted.position, 'render_seconds', 0, count(*), avg(replicate.render_seconds),
+    wanted.experiment_id, wanted.position, 'render_seconds', 0, count(*),
+    cast(printf('%.4g', avg(replicate.render_seconds)) as real),
     group_concat(distinct machine || ', ' || device || ', ' || threads || ' threads, ' || neighbours || ' beside it')
 from json_each(:cells) as given
 cross join experiment_cell as wanted on wanted.cell_id = given.value
