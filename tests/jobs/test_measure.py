@@ -69,7 +69,7 @@ def test_what_was_measured_touches_its_cells(store, artifacts):
     measurer.look_for_gaps()
     finish_all(measurer)
     assert select(store, "select spp from cell where revision > ?", seen) == [(1,)]
-    assert select(store, "select what from event where revision > ?", seen) == [("measure",)]
+    assert set(select(store, "select what from event where revision > ?", seen)) == {("measure",)}
 
 
 PLANS = [
