@@ -16,9 +16,11 @@ from jobs.store import Store
 from renderer.images import read_picture
 from renderer.metrics import METRICS, Reference
 from renderer.previews import error_png, preview_png, to_half
+from service import engine as engines
 from service import schemas
 from service.engine import Engine
 from service.hub import Hub
+from tests.jobs.painter import Painter
 from tests.service.conftest import PAINT, House, answer, house_of, refusal
 
 WIDTH, HEIGHT = 16, 12
@@ -111,13 +113,15 @@ def test_a_browser_asks_again_and_is_told_that_it_has_it(house: House, finished:
 
 
 def test_a_picture_of_another_data_directory_has_another_tag(
-    house: House, finished: dict[str, schemas.Cell], tmp_path: Path
+    house: House, finished: dict[str, schemas.Cell], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Cell 1 there is not cell 1 here, at the very same address."""
     here = house.client.get("/api/cells/1/pixels")
+    painter = Painter()
+    monkeypatch.setattr(engines, "LocalExecutor", lambda *_, **__: painter)
     engine = Engine(tmp_path / "other", PAINT, on_change=house.watch.poke)
     engine.start()
-    there = house_of(engine, house.painter, house.watch, Hub())
+    there = house_of(engine, painter, house.watch, Hub())
     there.submit(samplers=["independent"], spp=[9])
     there.finish(1)
     answer = there.client.get("/api/cells/1/pixels", headers={"if-none-match": here.headers["etag"]})
