@@ -71,12 +71,12 @@ def curves(store: Store, experiment: int, metric: str, scene: str | None = None)
 
 
 def _point(row: Row) -> Row:
-    mean, error, seconds = row["mean"], row["error"], row["seconds"]
+    mean, error = row["mean"], row["error"]
     half = None if error is None else student(row["n"] - 1) * error
     return {
         "cell": row["cell"], "spp": row["spp"], "spp_actual": row["spp_actual"], "n": row["n"], "mean": mean,
         "error": error, "low": None if half is None else _short(mean - half),
-        "high": None if half is None else _short(mean + half), "seconds": None if seconds is None else _short(seconds),
+        "high": None if half is None else _short(mean + half), "seconds": row["seconds"],
     }  # fmt: skip
 
 

@@ -187,6 +187,7 @@ def test_what_is_sent_is_json_and_nothing_that_only_looks_like_it():
     """No NaN, no letters that end a line of a stream."""
     with pytest.raises(ValueError, match="JSON compliant"):
         views.to_json({"x": float("nan")})
+    assert json.loads(views.to_json({"NaN": "Infinity"})) == {"NaN": "Infinity"}
     text = views.to_json({"name": "a\nb\r\u2028é"})
     assert "\n" not in text and "\r" not in text
     assert json.loads(text) == {"name": "a\nb\r\u2028é"}
