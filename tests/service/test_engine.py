@@ -261,6 +261,7 @@ def test_a_folder_that_cannot_be_written_stalls_it_until_it_can(engine, painter,
 
 
 FULL = """
+import os
 import sys
 from pathlib import Path
 from jobs import experiments
@@ -270,6 +271,7 @@ from service.engine import Engine
 from tests.jobs.conftest import assert_sound, planned
 from tests.service.conftest import Watch
 
+out = os.fdopen(os.dup(1), "w")  # reading a picture swaps stdout for a moment
 folder, watch = Path(sys.argv[1]), Watch()
 engines.RETRY_SECONDS = 0.01
 filler = folder / "filler.bin"
@@ -283,13 +285,13 @@ def submit_and_fill(store, dispatcher):
             while file.write(bytes(4096)):
                 pass
         except OSError as error:
-            print(error.strerror)
+            print(error.strerror, file=out)
         file.truncate(file.tell() - int(sys.argv[2]))
     return found
 
 found = engine.do(submit_and_fill)
 watch.until(lambda: engine.moment.state == "stalled")
-print(engine.moment.trouble)
+print(engine.moment.trouble, file=out)
 filler.unlink()
 
 def state():
@@ -297,9 +299,10 @@ def state():
         return experiments.standing(store, found.id)
 
 watch.until(lambda: state().state == "done" and engine.moment.state == "idle")
-print(engine.moment.trouble, state().failed, state().had)
+print(engine.moment.trouble, state().failed, state().had, file=out)
 engine.do(lambda store, _: assert_sound(store))
 engine.stop()
+out.close()
 """
 
 
@@ -321,7 +324,7 @@ def test_a_full_disk_stalls_it_until_there_is_space(tmp_path, space):
     full, trouble, *rest = told.stdout.splitlines()
     assert full == "No space left on device"
     assert "is full; free some space and run again: what was finished is there" in trouble
-    assert rest == ["None 0 6"]
+    assert rest == ["None 0 6"], told
 
 
 def test_a_render_process_that_is_killed_is_replaced(rendered: House):
