@@ -118,6 +118,17 @@ def test_changes_are_done_one_after_the_other(engine):
     assert engine.moment.revision == 20
 
 
+def test_who_changes_something_and_asks_what_is_new_sees_it(engine, monkeypatch):
+    """The moment is that of the change when the answer comes, not some turn later."""
+    monkeypatch.setattr(engine, "_turn", lambda store: None)
+
+    def change(store, dispatcher):
+        return store.insert("add_event", at="now", what="x", cell_id=None, experiment_id=None)
+
+    for _ in range(20):
+        assert engine.do(change) == engine.moment.revision
+
+
 def test_what_is_still_asked_when_it_ends_is_refused_at_once(tmp_path, painter, monkeypatch):
     """A request that waits would keep the process alive after SIGTERM."""
     engine = Engine(tmp_path / "data", PAINT)
