@@ -35,8 +35,8 @@ T = TypeVar("T", bytes, NDArray[np.float32])
 Floats = NDArray[np.float32]
 
 SIZES = (64, 128, 256, 512)  # pixels of a preview's longer side: few, so that pages share them
-KEPT_PNG_BYTES = 2**25  # some hundred previews
-KEPT_PICTURE_BYTES = 2**27  # an image grid asks for many parts of one reference
+KEPT_PNG_BYTES = 2**23  # what asks for the same again finds it in service/kept.py
+KEPT_PICTURE_BYTES = 3 * 2**24  # a reference in halves and a picture of it, of 1024 × 1024 pixels
 MEAN = "mean"  # in place of a replicate's number: the mean of all of them
 
 
