@@ -5,7 +5,7 @@ What a server costs that has nothing to do: memory and CPU of its process tree.
 
 One data directory with a finished experiment of 1000 cells. The server is looked at when it has just been started, and
 again when it has rendered a small grid and ended its render process; each time without and with a page of the
-experiment open. A page is opened a while before the measurement, and what it loads stays in the server's caches.
+experiment open; and last with caches that are full.
 """
 
 from __future__ import annotations
@@ -48,6 +48,8 @@ def main() -> int:
             wait_for_rest(server)
             look("after work", server, seconds)
             look_with_page("after work, one page", server, seconds, chromium, experiment)
+            see_all(server, experiment)
+            look("after every picture was seen", server, seconds)
     print(f"aims: RSS < {AIM_MB:g} MB, CPU < {AIM_PERCENT:g} %, where the render process has ended")
     return 0
 
@@ -76,6 +78,14 @@ def work(server: Server) -> None:
     while (state := json.loads(server.fetch(path))["state"]) in ("queued", "running"):
         time.sleep(0.5)
     assert state == "done", state
+
+
+def see_all(server: Server, experiment: int) -> None:
+    """Fill the caches of the server: every picture, and its error."""
+    for cell in json.loads(server.fetch(f"/api/experiments/{experiment}/cells?limit=2000"))["cells"]:
+        if cell["role"] == "cell" and cell["state"] == "done":
+            server.fetch(f"/api/cells/{cell['cell']}/preview.png?k=0&size=128&v=done")
+            server.fetch(f"/api/cells/{cell['cell']}/error/relmse.png?reference={cell['reference']}&k=0&size=128")
 
 
 def wait_for_rest(server: Server) -> None:
