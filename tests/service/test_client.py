@@ -307,7 +307,11 @@ def test_patience_has_an_end(serve) -> None:
 
 
 @given(
-    st.lists(st.tuples(st.sampled_from(["update", "progress"]), st.text(st.characters(exclude_characters="\r\n")))),
+    st.lists(
+        st.tuples(
+            st.sampled_from(["update", "progress"]), st.text(st.characters(codec="utf-8", exclude_characters="\r\n"))
+        )
+    ),
     st.sampled_from(["\n", "\r\n"]),
     st.lists(st.integers(0, 500)),
 )
