@@ -10,6 +10,7 @@ that leaves (Welch 1947, Satterthwaite 1946). The test of this module counts how
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ class Slope:
     high: float
 
 
+@functools.lru_cache(1024)  # thousands of points have the same few
 def student(freedom: float) -> float:
     """Half-width of a 95 % interval in standard errors, for one degree of freedom or more; interpolated between two."""
     if freedom > len(STUDENT_95):
