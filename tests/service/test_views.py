@@ -185,9 +185,10 @@ def test_the_worker_is_told_with_what_it_draws():
 
 def test_what_is_sent_is_json_and_nothing_that_only_looks_like_it():
     """No NaN, no letters that end a line of a stream."""
-    with pytest.raises(ValueError, match="JSON compliant"):
-        views.to_json({"x": float("nan")})
-    assert json.loads(views.to_json({"NaN": "Infinity"})) == {"NaN": "Infinity"}
+    for value in ({"x": float("nan")}, [float("-inf")], [1.0, float("inf")]):
+        with pytest.raises(ValueError, match="JSON compliant"):
+            views.to_json(value)
+    assert json.loads(views.to_json({"NaN": ":NaN"})) == {"NaN": ":NaN"}
     text = views.to_json({"name": "a\nb\r\u2028é"})
     assert "\n" not in text and "\r" not in text
     assert json.loads(text) == {"name": "a\nb\r\u2028é"}
