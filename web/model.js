@@ -41,8 +41,10 @@ export class ExperimentModel {
   problem = null;
   /** @type {"live" | "reconnecting" | "down"} */
   stream = "live";
-  /** Grows whenever cells changed; progress alone leaves it. */
+  /** Grows whenever cells changed here, page by page too; progress alone leaves it. */
   revision = 0;
+  /** The service's revision at which cells of this experiment last changed: what was read since then is still true. */
+  seen = 0;
 
   /** @type {Set<() => void>} */
   #subscribers = new Set();
@@ -109,7 +111,10 @@ export class ExperimentModel {
         const page = await experiments.cells(this.id, { start, limit });
         if (this.#closed) return;
         for (const cell of page.cells) if (!this.#fresh.has(cell.position)) this.#put(cell);
-        if (start === 0) this.#follow(page.revision);
+        if (start === 0) {
+          this.seen = page.revision;
+          this.#follow(page.revision);
+        }
         start = page.next;
         this.#changed();
       }
@@ -156,6 +161,7 @@ export class ExperimentModel {
   /** @param {Update} update */
   #update(update) {
     this.experiment = update.experiment;
+    if (update.cells.length || update.reload) this.seen = update.revision;
     for (const cell of update.cells) {
       this.#fresh?.add(cell.position);
       this.#put(cell);

@@ -107,6 +107,20 @@ test("any number of events is one notice a frame, and a closed model is silent",
   assert.equal(heard, 1);
 });
 
+test("what was read at a revision stays true until cells of the experiment change", async () => {
+  answer = service();
+  const model = new ExperimentModel(7);
+  await model.open();
+  assert.equal(model.seen, 40);
+  streams[0].send("update", update(45, [])); // of another experiment
+  assert.equal(model.seen, 40);
+  streams[0].send("update", update(46, [cell(1, { state: "running" })]));
+  assert.equal(model.seen, 46);
+  streams[0].send("update", update(47, [], { reload: true }));
+  assert.equal(model.seen, 47);
+  model.close();
+});
+
 test("progress ends with its cell, and belongs to the role that is drawn", async () => {
   answer = service();
   const model = new ExperimentModel(7);

@@ -64,13 +64,15 @@ function Followed({ id, onAgain }) {
 /** @param {{model: ExperimentModel, detail: ExperimentDetail, onDeleted: () => void}} props */
 function Page({ model, detail, onDeleted }) {
   const slow = useSlowly(model.revision, SLOW_MS);
-  const spp = useMemo(() => usualSpp(model, detail), [model, detail, slow]);
+  // By the first page until all have come: else the grid would jump from spp to spp, and fetch pictures of each.
+  const known = model.complete ? slow : model.cells.length ? "first page" : "nothing";
+  const spp = useMemo(() => usualSpp(model, detail), [model, detail, known]);
   const { params } = useRoute();
   const text = params.toString();
   const view = useMemo(() => viewOf(new URLSearchParams(text), detail, spp), [text, detail, spp]);
   const [logged, setLogged] = useState(/** @type {number | null} */ (null));
   const [near, watch] = useNear();
-  const curves = useCurves(model.id, { metric: view.metric.name, scene: view.at["scene"] ?? "", revision: model.revision, near });
+  const curves = useCurves(model.id, { metric: view.metric.name, scene: view.at["scene"] ?? "", revision: model.seen, near });
   const found = useMemo(
     () => findings(detail, model.cells, curves.convergence?.series ?? []),
     [detail, model, slow, curves.convergence],
