@@ -376,6 +376,14 @@ test("the plot's modules import only each other at run time: the report inlines 
   }
 });
 
+test("panels repeat the other curves only while these can be told apart", () => {
+  const some = convergence();
+  const copies = (count) => Array.from({ length: count }, (_, i) => ({ ...some.series[0], sampler: `s${i}` }));
+  const points = (count) => traces({ ...some, series: copies(count) }, { arrange: "multiples" }).reduce((sum, { x }) => sum + x.length, 0);
+  assert.ok(points(40) > 40 * 39 * 3);
+  assert.ok(points(50) < 50 * 50 * 2);
+});
+
 test("a point that is mostly the reference's noise is hollow, and the noise is shaded", () => {
   const noisy = convergence(RELMSE, (series) => ({ ...series, floor: 0.05 }));
   for (const { marker } of curves(traces(noisy))) {

@@ -3,8 +3,8 @@
  * A metric against samples per pixel or seconds: one curve per integrator × sampler, with its 95 % band.
  *
  * Both axes are logarithmic: independent samples fall with slope −1 in a mean squared error, and a better point set
- * shows as a steeper line. In small multiples every panel repeats all curves in grey, so that each is read against the
- * rest. Points lie at the spp that was rendered; a point in the reference's own noise is hollow.
+ * shows as a steeper line. In small multiples every panel repeats all curves in grey, unless they are many, so that each is read
+ * against the rest. Points lie at the spp that was rendered; a point in the reference's own noise is hollow.
  *
  * Pure; the exported report inlines this very file and `plan.js`.
  */
@@ -18,7 +18,7 @@ import { chosen, isLog, isNoise, planOf, xOf } from "./plan.js";
 /** @typedef {import("./plan.js").Panel} Panel */
 /** @typedef {import("./plan.js").Plan} Plan */
 
-const MARKED = 40; // curves: with more, markers are a blur and take most of the time to draw
+const MARKED = 40; // curves: with more, markers and the grey curves of other panels are a blur, and most of the drawing
 const PANEL_HEIGHT = 190; // px
 const OVERLAY_HEIGHT = 430; // px
 const COLUMN_GAP = 0.03; // of the plot's width
@@ -33,7 +33,7 @@ export function traces(convergence, options = {}) {
   const plan = planOf(convergence, options);
   const below = plan.panels.flatMap((panel) => [
     guides(panel, plan),
-    ...(options.arrange === "multiples" ? [context(panel, plan, options)] : []),
+    ...(options.arrange === "multiples" && plan.curves.length <= MARKED ? [context(panel, plan, options)] : []),
     ...(options.band === false ? [] : bands(panel, plan, options)),
   ]);
   const above = plan.panels.flatMap((panel) => panel.curves.map((curve) => line(curve, panel, convergence, plan, options)));
