@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from html.parser import HTMLParser
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 
 from jobs import points, queue
 from jobs.artifacts import Artifacts
@@ -19,28 +16,12 @@ from jobs.measure import Measurer
 from jobs.store import Store
 from service.report import render_report
 from tests.e2e.conftest import chromium as chromium
+from tests.jobs.conftest import artifacts as artifacts
 from tests.jobs.conftest import claim, draw, submit
+from tests.jobs.conftest import data as data
+from tests.jobs.conftest import store as store
 
 VOID = {"meta", "link", "img", "br", "wbr", "input", "hr"}  # elements that have no end
-
-
-@pytest.fixture
-def data(tmp_path) -> Path:
-    return tmp_path / "data"
-
-
-@pytest.fixture
-def store(data) -> Iterator[Store]:
-    store = Store.open(data)
-    yield store
-    store.close()
-
-
-@pytest.fixture
-def artifacts(data) -> Artifacts:
-    artifacts = Artifacts(data)
-    artifacts.prepare()
-    return artifacts
 
 
 def work_off(store: Store, artifacts: Artifacts, *, cells: int | None = None, failing: tuple[int, ...] = ()) -> None:
