@@ -3,10 +3,10 @@ How long a stranger waits for the dashboard: from a bare checkout to a picture o
 
     python -m benchmarks.up
 
-The checkout is bare as in benchmarks/first_start.py: no `.venv`, an empty HOME, LLVM unpacked anew. A browser is open
-already and asks for the demo experiment's page until it answers; what counts is a thumbnail that is decoded and on
-screen. The second start has everything, the data too: what counts is the list, and the experiment's page with its
-pictures and its tools.
+The checkout is bare as in benchmarks/first_start.py: no `.venv` and an empty HOME; a libLLVM of the machine is used if
+one is new enough, else it is fetched beside the packages. A browser is open already and asks for the demo experiment's
+page until it answers; what counts is a thumbnail that is decoded and on screen. The second start has everything, the
+data too: what counts is the list, and the experiment's page with its pictures while the demo goes on rendering.
 """
 
 from __future__ import annotations
