@@ -94,11 +94,10 @@ class Server(uvicorn.Server):
 
 def submit_demo(engine: Engine) -> None:
     """The demo grid, if there is no experiment yet: the first start shows something."""
-    wanted = plan.expand(grid.read(DEMO))
 
     def submit(store: Store, dispatcher: Dispatcher) -> None:
         if store.one("experiment_by_id", id=1) is None and not experiments.everything(store):
-            dispatcher.submit(wanted)
+            dispatcher.submit(plan.expand(grid.read(DEMO)))
 
     engine.do(submit)
 
