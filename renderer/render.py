@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import drjit as dr
@@ -24,7 +25,7 @@ from renderer.errors import BadParameter
 from renderer.frame import Frame, PassSum
 from renderer.integrators.adapter import adapter
 from renderer.scenes.load import LoadedScene
-from renderer.spec import CellSpec
+from renderer.spec import CellSpec, Choice
 
 # Aimed at, about 340 MB of wavefront: 16 samples per pixel of a 512×512 picture, so that the lanes of one SIMD packet
 # start in one pixel and stay together. 2**20 (4 samples) is up to 7 % slower; 2**24 no faster, with passes of seconds.
@@ -79,17 +80,19 @@ def render(
     loaded: LoadedScene,
     seeds: Iterable[int],
     on_pass: Callable[[Progress], None] = lambda progress: None,
+    points: Path | None = None,
 ) -> Iterator[Rendering]:
     """
     Draw one picture of ``spec`` per seed, each as soon as it is done.
 
     ``loaded`` is the scene of ``spec.estimand``; ``on_pass`` is called after every pass but costs only what it
-    does itself. Raises ``BadParameter`` if the sampler does not take the spp of the spec.
+    does itself. ``points`` is the folder of the point sets that people brought along, by digest. Raises
+    ``BadParameter`` if the sampler does not take the spp of the spec.
     """
     width, height = spec.estimand.size
     k = samples_per_pass(width * height, spec.spp)
     frame = Frame(loaded, k, spec.spp)
-    integrator, sampler = adapter(spec), _sampler(spec)
+    integrator, sampler = adapter(spec), make_sampler(spec.sampler, spec.spp, points)
     for replicate, seed in enumerate(seeds):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
@@ -154,15 +157,31 @@ def _tell_frame(sampler: Any, frame: Frame, first_sample: int) -> None:
         tell(*frame.film_size, crop, frame.samples, first_sample)
 
 
-def _sampler(spec: CellSpec) -> Any:
-    entry = catalog.find("sampler", spec.sampler.name)
-    sampler = mi.load_dict({"type": entry.plugin, "sample_count": spec.spp, **dict(spec.sampler.parameters)})
-    if sampler.sample_count() != spec.spp:
+def make_sampler(choice: Choice, spp: int, points: Path | None = None) -> Any:
+    """
+    The plugin of a sampler, for ``spp`` samples per pixel; ``points`` as for ``render``.
+
+    Raises ``BadParameter`` if it takes another number of samples, or if its point set is not in the folder.
+    """
+    entry = catalog.find("sampler", choice.name)
+    parameters = dict(choice.parameters)
+    if (digest := parameters.pop("points", None)) is not None:
+        parameters["path"] = str(_point_file(points, str(digest), str(parameters.pop("file", ""))))
+    sampler = mi.load_dict({"type": entry.plugin, "sample_count": spp, **parameters})
+    if sampler.sample_count() != spp:
         raise BadParameter(
-            f"the sampler {spec.sampler.name!r} would render {sampler.sample_count()} samples per pixel, "
-            f"the cell says {spec.spp}; its rounding rule in the catalog is wrong"
+            f"the sampler {choice.name!r} would render {sampler.sample_count()} samples per pixel, "
+            f"the cell says {spp}; its rounding rule in the catalog is wrong"
         )
     return sampler
+
+
+def _point_file(points: Path | None, digest: str, name: str) -> Path:
+    """The snapshot of a point set."""
+    file = points / f"{digest}.npz" if points else None
+    if file is None or not file.is_file():
+        raise BadParameter(f"the points of {name} are not in the data directory; submit the grid again with its file")
+    return file
 
 
 def _compile_seconds() -> float:

@@ -29,7 +29,8 @@ def use(variant: str, threads: int | None = None) -> None:
     """
     Make ``variant`` this process's own, with ``threads`` worker threads (default: one a core).
 
-    Mitsuba's log is cut down to warnings. Raises ``ImportError`` where the backend's library is missing.
+    Our plugins are registered. Mitsuba's log is cut down to errors. Raises ``ImportError`` where the backend's library
+    is missing.
     """
     import drjit as dr
     import mitsuba as mi
@@ -38,3 +39,6 @@ def use(variant: str, threads: int | None = None) -> None:
     mi.set_log_level(mi.LogLevel.Error)  # a sampler that rounds warns; the catalog has said so already
     if threads is not None:
         dr.set_thread_count(threads)
+    from renderer.plugins import register_all  # they derive from the variant's classes
+
+    register_all()

@@ -26,7 +26,19 @@ from renderer import __version__
 from renderer.errors import DartboardError, EnvironmentProblem, shown
 from service.control import Action
 from service.eventstream import events_in
-from service.schemas import Cell, Cells, Experiment, ExperimentDetail, Health, Problem, Progress, Scene, Update, Worker
+from service.schemas import (
+    Cell,
+    Cells,
+    Experiment,
+    ExperimentDetail,
+    Health,
+    PointFile,
+    Problem,
+    Progress,
+    Scene,
+    Update,
+    Worker,
+)
 
 CONNECT_SECONDS = 5.0
 ANSWER_SECONDS = 60.0  # without a byte; a report of a large experiment takes some seconds
@@ -142,19 +154,19 @@ class Client:
 
     def upload(self, name: str, main: str, archive: IO[bytes], size: int) -> Scene:
         """Send a scene's folder as a zip of ``size`` bytes."""
+        kind = {"Content-Type": "application/zip", "Content-Length": str(size)}
+        return self._parse(Scene, self._send("/api/scenes", {"name": name, "main": main}, archive, kind).content)
 
-        def send() -> httpx.Response:
-            archive.seek(0)
-            headers = {"Content-Type": "application/zip", "Content-Length": str(size)}
-            return self._request(
-                "POST", "/api/scenes", params={"name": name, "main": main}, content=archive, headers=headers
-            )
+    def upload_points(self, name: str, file: IO[bytes]) -> PointFile:
+        """Send a point file, from where it stands open."""
+        kind = {"Content-Type": "application/octet-stream", "Content-Length": str(file.seek(0, os.SEEK_END))}
+        return self._parse(PointFile, self._send("/api/points", {"name": name}, file, kind).content)
 
-        return self._parse(Scene, self._patiently(send).content)
-
-    def submit(self, toml: str, origin: str, scenes: dict[str, str]) -> tuple[Experiment, bool]:
+    def submit(
+        self, toml: str, origin: str, scenes: dict[str, str], points: dict[str, str] | None = None
+    ) -> tuple[Experiment, bool]:
         """A grid → (its experiment, whether it is new)."""
-        body = {"toml": toml, "origin": origin, "scenes": scenes}
+        body = {"toml": toml, "origin": origin, "scenes": scenes} | ({"points": points} if points else {})
         headers = {"Idempotency-Key": uuid.uuid4().hex}
         answer = self._patiently(lambda: self._request("POST", "/api/experiments", json=body, headers=headers))
         return self._parse(Experiment, answer.content), answer.status_code == httpx.codes.CREATED
@@ -223,9 +235,24 @@ class Client:
 
     def _request(self, method: str, path: str, **options: Any) -> httpx.Response:
         with self._told():
-            answer = self.http.request(method, path, **options)
+            try:
+                answer = self.http.request(method, path, **options)
+            except httpx.RemoteProtocolError:
+                if method != "GET":
+                    raise
+                # A connection that was kept, and that the server closed in the moment in which we used it again.
+                answer = self.http.request(method, path, **options)
             self._check(answer)
             return answer
+
+    def _send(self, path: str, query: dict[str, str], content: IO[bytes], headers: dict[str, str]) -> httpx.Response:
+        """Post a file, from its beginning."""
+
+        def send() -> httpx.Response:
+            content.seek(0)
+            return self._request("POST", path, params=query, content=content, headers=headers)
+
+        return self._patiently(send)
 
     def _patiently(self, send: Callable[[], httpx.Response]) -> httpx.Response:
         """Send again when the connection breaks, a few times: for requests that take long."""

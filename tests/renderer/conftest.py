@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,15 @@ import pytest
 from renderer import catalog
 from renderer.scenes import sources
 from renderer.spec import CellSpec, Choice, Estimand
+
+
+@pytest.fixture(scope="session", autouse=True)
+def tables(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Point sets are made in, and read from, a folder of this test run."""
+    folder = tmp_path_factory.mktemp("tables")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("DARTBOARD_TABLES", str(folder))
+        yield folder
 
 
 @pytest.fixture(scope="session")

@@ -225,6 +225,13 @@ def test_the_token_comes_from_the_environment(serve, monkeypatch: pytest.MonkeyP
     assert server.seen[0][2]["Authorization"] == "Bearer 0123456789abcdef"
 
 
+def test_a_question_on_a_kept_connection_that_breaks_is_asked_again(serve) -> None:
+    server = serve(lambda handler, n: handler.hang_up() if n == 1 else handler.say(200, "application/json", WORKER))
+    with Client(server.url) as client:
+        assert client.worker().state == "idle"
+    assert len(server.seen) == 2
+
+
 # -- experiments --
 
 
