@@ -27,6 +27,7 @@ class Artifacts:
         self.work = self.data / "work"
         self.logs = self.data / "logs"
         self.scenes = self.data / "scenes"
+        self.points = self.data / "points"
         self.previews = self.data / "previews"
         self.empty = self.data / "work" / "empty"  # working directory of render processes
 

@@ -14,6 +14,7 @@ from typing import Any
 
 from jobs.points import SECONDS
 from jobs.store import Row, Store
+from renderer import catalog
 from renderer.metrics import METRICS
 
 PAGE = 1000  # cells, when nobody says how many
@@ -65,4 +66,5 @@ def _cells(rows: Iterable[Row]) -> Iterator[Row]:
         row["sweep"] = json.loads(row["sweep"]) if row["sweep"] else {}
         if row["state"] != "failed":
             row["error_class"] = row["error"] = None
+        row["replay"] = catalog.is_replay(row["sampler"])
         yield row | {"seconds": seconds, "metrics": {name: metrics[name] for name in METRICS if name in metrics}}

@@ -13,6 +13,7 @@ from typing import Any
 
 from jobs.slopes import Slope, slope, student
 from jobs.store import Row, Store
+from renderer import catalog
 from renderer.errors import UnknownName
 from renderer.metrics import METRICS
 
@@ -22,9 +23,10 @@ class Series:
     """
     One curve. Points have the names of ``Point`` on the wire.
 
-    alike  all its renders were timed under the conditions that most of the experiment's were
-    floor  what an exact picture would measure: the reference's own noise. None where the metric has none, or where it
-           is not measured yet
+    alike   all its renders were timed under the conditions that most of the experiment's were
+    floor   what an exact picture would measure: the reference's own noise. None where the metric has none, or where it
+            is not measured yet
+    replay  its sampler shows a published mistake: it is read against the spp that were asked, as its authors read it
     """
 
     scene: str
@@ -35,6 +37,7 @@ class Series:
     slope: Slope | None = None
     alike: bool = True
     floor: float | None = None
+    replay: bool = False
 
 
 def curves(store: Store, experiment: int, metric: str, scene: str | None = None) -> list[Series]:
@@ -58,6 +61,7 @@ def curves(store: Store, experiment: int, metric: str, scene: str | None = None)
         if key not in found:
             sweep = json.loads(row["sweep"]) if row["sweep"] else {}
             found[key] = Series(*key[:3], sweep=sweep, floor=floors.get(row["reference"]))
+            found[key].replay = catalog.is_replay(row["sampler"])
             conditions[key] = set()
         found[key].points.append(_point(row))
         if row["conditions"]:
@@ -66,7 +70,7 @@ def curves(store: Store, experiment: int, metric: str, scene: str | None = None)
     for key, series in found.items():
         series.alike = conditions[key] <= {usual[0][0]} if usual else True
         if METRICS[metric].lower_is_better is not None:  # a brightness falls towards nothing
-            series.slope = slope(series.points)
+            series.slope = slope(series.points, "spp" if series.replay else "spp_actual")
     return list(found.values())
 
 

@@ -122,7 +122,7 @@ class Dispatcher:
 
     def submit(self, wanted: Plan, key: str | None = None) -> tuple[Experiment, int]:
         """``experiments.submit``; what the plan shares with others is measured against its own references."""
-        found, new = experiments.submit(self.store, wanted, self.artifacts.scenes, key)
+        found, new = experiments.submit(self.store, wanted, self.artifacts.scenes, key, points=self.artifacts.points)
         self.measurer.look_into(found.id)
         return found, new
 
@@ -167,6 +167,7 @@ class Dispatcher:
                     replicates=work.missing,
                     out=self.artifacts.work,
                     preview=self.artifacts.preview(work.digest),
+                    points=self.artifacts.points,
                 )
             )
 

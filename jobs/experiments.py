@@ -14,10 +14,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from jobs import points, queue
+from jobs import queue
 from jobs.errors import KeyReused, NotFound, WasDeleted
 from jobs.plan import Plan, Role
+from jobs.points import refresh_experiment
 from jobs.store import Store, now
+from renderer.samplers import pointfile
 from renderer.scenes import sources
 
 _ID = re.compile(r"[0-9]{1,18}")  # what SQLite can hold
@@ -72,17 +74,23 @@ class Standing:
 _STATES = ("running", "queued", "paused", "failed", "cancelled", "done")
 
 
-def submit(store: Store, plan: Plan, scenes: Path, key: str | None = None) -> tuple[Experiment, int]:
+def submit(
+    store: Store, plan: Plan, scenes: Path, key: str | None = None, *, points: Path | None = None
+) -> tuple[Experiment, int]:
     """
     Record a plan → (its experiment, how many cells are new). Submitting it again changes nothing, but an
     experiment that was cancelled, paused or deleted is wanted again.
 
     scenes  folder for the snapshots: a cell never renders a file that its author may still edit
+    points  folder for the snapshots of point files, for the same reason; a plan without any needs none
     key     of a client that may send the same request twice: the second changes nothing at all. Raises
             ``KeyReused`` if the key came with another grid
     """
     for request in plan.grid.scenes:
         sources.snapshot(request.source, scenes)
+    for source in plan.grid.points:
+        assert points, "a plan with point files needs a folder for them"
+        pointfile.snapshot(source, points)
     with store.transaction():
         if key is not None and (sent := store.one("submission", key=key)):
             if sent["digest"] != plan.grid.digest:
@@ -97,7 +105,7 @@ def submit(store: Store, plan: Plan, scenes: Path, key: str | None = None) -> tu
             before = store.value("count_cells")
             known = _insert(store, plan)
             queue.want(store, known)
-            points.refresh_experiment(store, known)
+            refresh_experiment(store, known)
             cells = store.value("count_cells") - before
         if key is not None:
             store.run("add_submission", key=key, digest=plan.grid.digest, experiment_id=known, at=now())

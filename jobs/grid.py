@@ -8,7 +8,8 @@ A grid has these keys; all but ``scenes`` may be left out. Where a list is expec
 
     name         how people call the experiment (default: the name of the file)
     scenes       names of built-in scenes, and paths relative to the grid's own folder
-    samplers     NAME, NAME:key=value or { type = NAME, key = value } (default: independent)
+    samplers     NAME, NAME:key=value or { type = NAME, key = value } (default: independent); the file of a pointset
+                 is a path relative to the grid's own folder
     integrators  the same (default: path)
     spp          samples per pixel, 1 to 10⁷ (default: 16, 64, 256); every sampler rounds by its own rule
     replicates   pictures of each cell with different seeds, 1 to 1000 (default: 4, enough to see a spread)
@@ -32,10 +33,13 @@ from typing import Any
 
 from jobs.errors import GridError
 from jobs.fields import Problems, Table, choice
+from jobs.gridpoints import PointFinder, bind, check_count, file_of, nowhere, points_of
 from jobs.gridscenes import Finder, scenes_of
 from jobs.gridspec import MAX_CELLS, MAX_REPLICATES, GridSpec, ReferenceRequest, SceneRequest
 from renderer import catalog
 from renderer.errors import UnknownName, shown
+from renderer.samplers import pointfile
+from renderer.samplers.pointfile import PointSource
 from renderer.scenes import sources
 from renderer.spec import Choice
 
@@ -71,7 +75,10 @@ def read(path: Path) -> GridSpec:
         line = content.count(b"\n", 0, error.start) + 1
         raise GridError([f"{path} is not UTF-8 text (line {line}); save it as UTF-8"]) from None
     data = loads(text, str(path))
-    return parse(data, find=partial(sources.find, base=path.parent), origin=path.name)
+    return parse(
+        data, find=partial(sources.find, base=path.parent), points=partial(pointfile.find, base=path.parent),
+        origin=path.name,
+    )  # fmt: skip
 
 
 def loads(text: str, origin: str) -> dict[str, Any]:
@@ -88,10 +95,10 @@ def loads(text: str, origin: str) -> dict[str, Any]:
         raise GridError([f"{origin} is not TOML{where}: {reason}; correct it there; {EXAMPLE}"]) from None
 
 
-def parse(data: Mapping[str, Any], *, find: Finder, origin: str) -> GridSpec:
+def parse(data: Mapping[str, Any], *, find: Finder, origin: str, points: PointFinder = nowhere) -> GridSpec:
     """
-    The grid in parsed TOML or JSON. ``find`` gives the scene of a name, ``origin`` is what sentences call the request
-    ("grid.toml"). Raises ``GridError`` with every problem found.
+    The grid in parsed TOML or JSON. ``find`` gives the scene of a name and ``points`` the point file, ``origin`` is
+    what sentences call the request ("grid.toml"). Raises ``GridError`` with every problem found.
     """
     problems = Problems()
     if not isinstance(data, Mapping):
@@ -103,7 +110,8 @@ def parse(data: Mapping[str, Any], *, find: Finder, origin: str) -> GridSpec:
     samplers = _choices(grid, "samplers", "sampler", "independent")
     integrators = _choices(grid, "integrators", "integrator", "path")
     rfilter = choice(grid, "rfilter", grid.data.get("rfilter", "box"), grid.place("rfilter"))
-    spp = _spp(grid, samplers)
+    files = points_of(grid, samplers, points)
+    spp = _spp(grid, samplers, files)
     name, colour, replicates = _name(grid), _colour(grid), grid.integer("replicates", 1, MAX_REPLICATES)
     names = _scene_names(grid)
     _check_count(grid, {"scenes": names, "integrators": integrators, "samplers": samplers, "spp": spp})
@@ -111,8 +119,9 @@ def parse(data: Mapping[str, Any], *, find: Finder, origin: str) -> GridSpec:
     problems.raise_any()
     assert name and rfilter and colour, "what could not be read is a problem"
     return GridSpec(
-        name, tuple(scenes), tuple(samplers), tuple(integrators), tuple(spp), replicates or 4, rfilter, colour
-    )
+        name, tuple(scenes), tuple(bind(samplers, files)), tuple(integrators), tuple(spp), replicates or 4, rfilter,
+        colour, tuple({source.digest: source for source in files.values()}.values()),
+    )  # fmt: skip
 
 
 def _scene_names(grid: Table) -> dict[str, str]:
@@ -135,13 +144,15 @@ def _choices(grid: Table, key: str, axis: str, default: str) -> list[Choice]:
     return list({item.text: item for item in read if item}.values())
 
 
-def _spp(grid: Table, samplers: Iterable[Choice]) -> list[int]:
+def _spp(grid: Table, samplers: Iterable[Choice], files: Mapping[str, PointSource]) -> list[int]:
     """The spp asked for, ascending, each once."""
     values = grid.values("spp", [16, 64, 256], MAX_CELLS)
     read = [grid.to_integer(value, place, 1, catalog.MAX_SPP) for value, place in values]
     spp = sorted({value for value in read if value is not None})
     for sampler in samplers if spp else ():  # rounding never reverses an order, so the largest tells
         grid.problems.attempt(partial(catalog.rendered_spp, sampler, spp[-1], grid.place("spp")))
+        if source := files.get(file_of(sampler) or ""):
+            grid.problems.attempt(partial(check_count, source, spp[-1], grid.place("spp")))
     return spp
 
 

@@ -161,6 +161,8 @@ def _reference_fields(table: Table, place: str) -> Mapping[str, Any] | bool | No
             read[axis] = choice(fields, axis, fields.data[axis], fields.place(axis))
     if read.get("integrator"):
         _check_follows(fields, read["integrator"])
+    if read.get("sampler"):
+        _check_right(fields, read["sampler"])
     return {key: item for key, item in read.items() if item is not None}
 
 
@@ -171,6 +173,13 @@ def _check_follows(fields: Table, integrator: Choice) -> None:
         if parameter.estimand and given.get(parameter.name) != parameter.default:
             follows = "a reference follows the cells that it is compared with; leave it out"
             fields.wrong(f"{parameter.name} in {fields.place('integrator')}", given[parameter.name], follows)
+
+
+def _check_right(fields: Table, sampler: Choice) -> None:
+    """What everything is measured against is neither wrong on purpose nor made of somebody's points."""
+    if catalog.is_replay(sampler) or sampler.name == "pointset":
+        label = catalog.label("sampler", sampler)
+        fields.wrong(fields.place("sampler"), label, "a reference takes a correct sampler, such as independent")
 
 
 def _reference(common: _Settings, own: _Settings | None) -> ReferenceRequest | None:

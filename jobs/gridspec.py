@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 from renderer import catalog
+from renderer.samplers.pointfile import PointSource
 from renderer.scenes.sources import SceneSource
 from renderer.spec import FORMAT, PASS_LOOP, PRECISION, SCENE_LOADER, Choice, canonical, digest_of
 
@@ -88,7 +89,11 @@ class SceneRequest:
 
 @dataclass(frozen=True)
 class GridSpec:
-    """A grid that was read and checked. ``samplers``, ``integrators`` and ``spp`` hold no value twice; spp ascends."""
+    """
+    A grid that was read and checked. ``samplers``, ``integrators`` and ``spp`` hold no value twice; spp ascends.
+
+    points  the files behind ``pointset`` samplers, which know them by digest
+    """
 
     name: str
     scenes: tuple[SceneRequest, ...]
@@ -98,6 +103,7 @@ class GridSpec:
     replicates: int
     rfilter: Choice
     colour: str
+    points: tuple[PointSource, ...] = ()
 
     @cached_property
     def text(self) -> str:

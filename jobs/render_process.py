@@ -8,7 +8,8 @@ stderr, the log. It never sees the database, keeps one scene loaded (a second li
 the end of stdin.
 
 An order:  {"order": 7, "spec": canonical text of the cell, "scene": folder, "main": "scene.xml",
-            "replicates": [["cell", 0], …], "out": folder for pictures, "preview": path or null}
+            "replicates": [["cell", 0], …], "out": folder for pictures, "preview": path or null,
+            "points": folder of point files, or null}
 Events:    ready · started · pass · replicate (a finished picture, "file" in the out folder) · done · failed
 """
 
@@ -99,7 +100,8 @@ class RenderProcess:
                           passes=progress.passes, seconds=progress.seconds, preview=previews.count)  # fmt: skip
 
         seeds = [seed(spec.digest, k, reference=role == "reference") for role, k in wanted]
-        for (role, k), rendering in zip(wanted, render(spec, loaded, seeds, on_pass), strict=True):
+        points = Path(order["points"]) if order["points"] else None
+        for (role, k), rendering in zip(wanted, render(spec, loaded, seeds, on_pass, points), strict=True):
             file = Path(order["out"]) / f"{order['order']}-{role}-{k}.exr"
             timing = {"render_seconds": rendering.render_seconds, "compile_seconds": rendering.compile_seconds}
             header = {

@@ -47,18 +47,20 @@ def student(freedom: float) -> float:
     return here + part * (there - here)
 
 
-def slope(points: Iterable[Mapping[str, Any]]) -> Slope | None:
+def slope(points: Iterable[Mapping[str, Any]], against: str = "spp_actual") -> Slope | None:
     """
     The exponent of a curve of points (spp_actual, mean, error, n). None for fewer than three different spp whose mean
     is positive and has an error.
+
+    against  what the spp of a point is: "spp_actual", as rendered, or "spp", as asked
     """
     by_spp = {
-        point["spp_actual"]: point for point in points if point["error"] is not None and point["mean"] > 0
+        point[against]: point for point in points if point["error"] is not None and point["mean"] > 0
     }  # requests that were rounded to one spp are one point
     if len(by_spp) < 3:
         return None
     used = list(by_spp.values())
-    x = [math.log(point["spp_actual"]) for point in used]
+    x = [math.log(point[against]) for point in used]
     y = [math.log(point["mean"]) for point in used]
     own = [point["n"] - 1 for point in used]
     return _fit(x, y, _variances(used), own)

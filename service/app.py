@@ -21,7 +21,7 @@ from starlette.staticfiles import StaticFiles
 
 from renderer import __version__
 from service import schemas
-from service.api import cells, events, experiments, scenes, server
+from service.api import cells, events, experiments, points, scenes, server
 from service.engine import Engine
 from service.hub import Hub
 from service.kept import Kept
@@ -68,7 +68,7 @@ def create(engine: Engine, hub: Hub, token: str | None = None) -> FastAPI:
     app.state.engine, app.state.hub = engine, hub
     app.state.pictures = Pictures(engine.artifacts)
     install(app)
-    for module in (server, experiments, cells, scenes, events):
+    for module in (server, experiments, cells, scenes, points, events):
         app.include_router(module.router)
     app.mount("/static", Assets(directory=WEB), name="static")
     for path in PAGES:

@@ -12,6 +12,7 @@ from jobs import disk
 from service.problems import TooLarge
 
 GRID_BYTES = 2**24  # a grid file of 16 MiB is refused on the command line too
+POINTS_BYTES = 2**26  # of a point file, and of what it unpacks to
 SCENE_BYTES = 2**28  # of a scene as a zip: 256 MiB, half of what it may unpack to
 
 

@@ -52,7 +52,7 @@ def run_grid(file: Path, data: Path, *, device: str, executor: str, report: Path
         artifacts.prepare()
         store = Store.open(data)
         queue.recover(store)
-        experiment, _ = experiments.submit(store, planned, artifacts.scenes)
+        experiment, _ = experiments.submit(store, planned, artifacts.scenes, points=artifacts.points)
         before = experiments.standing(store, experiment.id)
         interrupted = False
         if before.finished:

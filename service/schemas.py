@@ -47,7 +47,8 @@ class Problem(Wire):
 class Submission(BaseModel):
     """
     A grid as an object, or as the text of a TOML file; one of the two. ``scenes`` says which uploaded scene
-    (``POST /api/scenes``) a name in the grid's ``scenes`` stands for; built-in scenes need no entry.
+    (``POST /api/scenes``) a name in the grid's ``scenes`` stands for; built-in scenes need no entry. ``points`` says
+    the same of the files of ``pointset`` samplers (``POST /api/points``).
     """
 
     model_config = ConfigDict(
@@ -65,6 +66,7 @@ class Submission(BaseModel):
     toml: str | None = Field(None, max_length=2**24)
     origin: str = Field("grid", max_length=200, description="what sentences call the grid: the name of its file")
     scenes: dict[str, Digest] = Field({}, max_length=1000)
+    points: dict[str, Digest] = Field({}, max_length=1000)
 
 
 class Rounded(Wire):
@@ -107,6 +109,15 @@ class Scene(Wire):
     sampler: str
     spp: int
     files: list[str]
+
+
+class PointFile(Wire):
+    """A point file that a grid may name: ``sets`` sets of ``count`` points, each a pixel's samples at most."""
+
+    name: str
+    digest: Digest
+    sets: int
+    count: int
 
 
 # -- experiments -------------------------------------------------------------------------------------------------------
@@ -158,6 +169,8 @@ class ExperimentDetail(Experiment):
     default_metric: str
     toml: str
     paths: dict[str, str] = Field({}, description="uploaded scenes: name → digest")
+    points: dict[str, str] = Field({}, description="point files of pointset samplers: name → digest")
+    replays: list[str] = Field([], description="the samplers that show a published mistake, plotted at the spp asked")
 
 
 class Deleted(Wire):
@@ -190,6 +203,7 @@ class Cell(Wire):
     sampler: str
     spp: int = Field(description="asked")
     spp_actual: int = Field(description="rendered, after the sampler's rounding")
+    replay: bool = Field(False, description="its sampler shows a published mistake: never to be recommended")
     sweep: dict[str, Any] = {}
     state: State
     had: int
@@ -256,7 +270,8 @@ class Slope(Wire):
 
 class Series(Wire):
     """
-    One curve. ``alike``: all its renders were timed under the same conditions, so its seconds may be compared.
+    One curve. ``replay``: its sampler shows a published mistake; it is drawn, and its slope fitted, at the spp asked.
+    ``alike``: all its renders were timed under the same conditions, so its seconds may be compared.
     ``floor``: what an exact picture would measure, the noise of the reference; a mean near it says little.
     """
 
@@ -267,6 +282,7 @@ class Series(Wire):
     points: list[Point]
     slope: Slope | None
     alike: bool
+    replay: bool = False
     floor: float | None = None
 
 

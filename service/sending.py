@@ -1,8 +1,8 @@
 """
-A grid file on its way to a server: its text, and the scenes that lie beside it.
+A grid file on its way to a server: its text, and the scenes and point files that lie beside it.
 
 The server reads the grid with its own catalog and never opens a path that a client names, so what must be done here is
-only what needs the files: find each scene, vet it, and send exactly the files that it refers to.
+only what needs the files: find each scene and each point file, check it, and send exactly what the grid refers to.
 """
 
 from __future__ import annotations
@@ -17,7 +17,11 @@ from typing import IO, Any
 
 from jobs import grid
 from jobs.errors import GridError
+from jobs.gridpoints import file_of
+from renderer import catalog
 from renderer.errors import DartboardError, UnknownName
+from renderer.samplers import pointfile
+from renderer.samplers.pointfile import PointSource
 from renderer.scenes import sources
 from renderer.scenes.sources import SceneSource
 from service.client import Client, Refused
@@ -33,11 +37,15 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # of every file in a zip, so that a scene has the
 
 @dataclass(frozen=True)
 class Parcel:
-    """A grid's text, what sentences call it, and its scenes that are not built in, by their names in the grid."""
+    """
+    A grid's text, what sentences call it, its scenes that are not built in and its point files, by their names in the
+    grid.
+    """
 
     text: str
     origin: str
     scenes: Mapping[str, SceneSource]
+    points: Mapping[str, PointSource]
 
 
 def pack(file: Path) -> Parcel:
@@ -47,15 +55,14 @@ def pack(file: Path) -> Parcel:
             raise GridError([f"{file} is too large"])
         text = file.read_bytes().decode("utf-8-sig")
         data = grid.loads(text, str(file))
-        return Parcel(text, file.name[-ORIGIN_MAX:], dict(_scenes(data, file.parent)))
+        return Parcel(text, file.name[-ORIGIN_MAX:], dict(_scenes(data, file.parent)), dict(_points(data, file.parent)))
     except (OSError, ValueError, DartboardError):
         grid.read(file)  # says everything that is wrong with the grid, not only what was found here
         raise
 
 
 def _scenes(data: Mapping[str, Any], base: Path) -> Iterator[tuple[str, SceneSource]]:
-    names = data.get("scenes", [])
-    for name in names if isinstance(names, list) else [names]:
+    for name in _values(data, "scenes"):
         if isinstance(name, str) and name:
             try:
                 source = sources.find(name, base)
@@ -65,16 +72,34 @@ def _scenes(data: Mapping[str, Any], base: Path) -> Iterator[tuple[str, SceneSou
                 yield name, source
 
 
+def _points(data: Mapping[str, Any], base: Path) -> Iterator[tuple[str, PointSource]]:
+    for value in _values(data, "samplers"):
+        try:
+            name = file_of(catalog.resolve("sampler", value))
+        except UnknownName:  # the server may know it
+            continue
+        if name is not None:
+            yield name, pointfile.find(name, base)
+
+
+def _values(data: Mapping[str, Any], key: str) -> list[Any]:
+    """An axis of a grid: one value may stand without a list."""
+    values = data.get(key, [])
+    return values if isinstance(values, list) else [values]
+
+
 def send(client: Client, parcel: Parcel) -> tuple[Experiment, bool]:
-    """Submit it → (its experiment, whether it is new). Scenes are sent only to a server that lacks some of them."""
-    digests = {name: source.digest for name, source in parcel.scenes.items()}
+    """Submit it → (its experiment, whether it is new). Files are sent only to a server that lacks some of them."""
+    scenes = {name: source.digest for name, source in parcel.scenes.items()}
+    points = {name: source.digest for name, source in parcel.points.items()}
     try:
-        return client.submit(parcel.text, parcel.origin, digests)
+        return client.submit(parcel.text, parcel.origin, scenes, points)
     except Refused as refusal:
-        if not digests or refusal.status != UNPROCESSABLE:
+        if not (scenes or points) or refusal.status != UNPROCESSABLE:
             raise
-    digests = {name: _upload(client, name, source) for name, source in parcel.scenes.items()}
-    return client.submit(parcel.text, parcel.origin, digests)
+    scenes = {name: _upload(client, name, source) for name, source in parcel.scenes.items()}
+    points = {name: _upload_points(client, name, source) for name, source in parcel.points.items()}
+    return client.submit(parcel.text, parcel.origin, scenes, points)
 
 
 def _upload(client: Client, name: str, source: SceneSource) -> str:
@@ -83,6 +108,12 @@ def _upload(client: Client, name: str, source: SceneSource) -> str:
         length = file.tell()
         say(f"sending scene {name}: {len(source.files)} files, {size(length)}")
         return client.upload(name, source.main, file, length).digest
+
+
+def _upload_points(client: Client, name: str, source: PointSource) -> str:
+    say(f"sending point file {name}: {source.sets} sets of {source.count} points")
+    with source.path.open("rb") as file:
+        return client.upload_points(name, file).digest
 
 
 def archive(source: SceneSource, into: IO[bytes]) -> None:

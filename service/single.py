@@ -10,9 +10,12 @@ from typing import Any
 
 from jobs.executors.base import Failed, Finished, Order, Passed
 from jobs.executors.local import LocalExecutor
+from jobs.gridpoints import check_count, file_of, with_points
 from jobs.gridspec import MAX_PIXELS, MAX_SIDE
 from renderer import catalog, devices
 from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, SceneError
+from renderer.samplers import pointfile
+from renderer.samplers.pointfile import PointSource
 from renderer.scenes import sources
 from renderer.spec import CellSpec, Choice, Estimand
 from service.progress import single_bar
@@ -42,14 +45,18 @@ def render_one(
     if output.suffix.lower() != ".exr":
         raise BadParameter(f"cannot write {output.name}: pictures are OpenEXR files; give a name that ends in .exr")
     source = sources.find(scene, Path())
-    spec = cell(source, integrator=integrator, sampler=sampler, spp=spp, size=size, max_depth=max_depth)
+    points = _point_file(sampler)
+    spec = cell(source, integrator=integrator, sampler=sampler, spp=spp, size=size, max_depth=max_depth, points=points)
     with tempfile.TemporaryDirectory(prefix="dartboard-") as folder:
         out = Path(folder)
         snapshot = sources.snapshot(source, out / "scenes")
+        if points:
+            pointfile.snapshot(points, out / "points")
         (out / "work").mkdir()
         order = Order(
             order=1, spec=spec.text, colour="rgb", scene=snapshot, main=source.main,
             trust="builtin" if source.builtin else source.digest, replicates=(("cell", seed),), out=out / "work",
+            points=out / "points",
         )  # fmt: skip
         executor = LocalExecutor(
             devices.pick(device), kernels=usable_kernel_caches(out), logs=out / "logs", cwd=out / "empty"
@@ -79,11 +86,20 @@ def cell(
     spp: int | None,
     size: str | None,
     max_depth: int | None,
+    points: PointSource | None = None,
 ) -> CellSpec:
-    """The cell that these options mean for this scene, with the scene's own settings for what is not given."""
+    """
+    The cell that these options mean for this scene, with the scene's own settings for what is not given.
+
+    points  the file of a ``pointset`` sampler
+    """
     defaults = source.defaults
     how = _choice("integrator", integrator, defaults.integrator, source.name)
-    points = _choice("sampler", sampler, defaults.sampler, source.name)
+    drawing = _choice("sampler", sampler, defaults.sampler, source.name)
+    asked = defaults.spp if spp is None else spp
+    if points:
+        drawing = with_points(drawing, points, Path(points.name).name)
+        check_count(points, asked, "--spp")
     width, height = _size(size) if size else (defaults.width, defaults.height)
     entry = catalog.find("integrator", how.name)
     parameters = dict(how.parameters)
@@ -95,7 +111,13 @@ def cell(
         hide_emitters=bool(parameters.get("hide_emitters", False)),
     )  # fmt: skip
     how = Choice(how.name, how.version, tuple(pair for pair in how.parameters if pair[0] not in moved))
-    return CellSpec(estimand, how, points, catalog.rendered_spp(points, defaults.spp if spp is None else spp, "--spp"))
+    return CellSpec(estimand, how, drawing, catalog.rendered_spp(drawing, asked, "--spp"))
+
+
+def _point_file(sampler: str | None) -> PointSource | None:
+    """The file that ``--sampler pointset:file=…`` names; None for any other sampler."""
+    name = file_of(catalog.resolve("sampler", sampler, "--sampler")) if sampler else None
+    return pointfile.find(name, Path()) if name else None
 
 
 def _choice(axis: str, given: str | None, default: str, scene: str) -> Choice:

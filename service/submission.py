@@ -1,4 +1,4 @@
-"""From the body of a request to a plan: a grid as JSON or TOML, with the scenes that its client has uploaded."""
+"""From the body of a request to a plan: a grid as JSON or TOML, with the scenes and points that its client has sent."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from jobs.gridtoml import toml_of
 from jobs.plan import Plan
 from jobs.store import Store
 from renderer.errors import DartboardError
-from service import problems, schemas, uploads
+from service import problems, schemas, uploadedpoints, uploads
 
 TOML = "application/toml"
 JSON = "application/json"
@@ -30,7 +30,7 @@ def read(body: bytes, content_type: str) -> schemas.Submission:
     kind = content_type.partition(";")[0].strip().lower()
     if kind == TOML:
         try:
-            return schemas.Submission(toml=body.decode("utf-8-sig"), origin="the grid", scenes={})
+            return schemas.Submission(toml=body.decode("utf-8-sig"), origin="the grid", scenes={}, points={})
         except UnicodeDecodeError:
             raise DartboardError("the body is not UTF-8 text; send the grid file as UTF-8") from None
     if kind not in ("", JSON):
@@ -48,7 +48,8 @@ def planned(store: Store, artifacts: Artifacts, asked: schemas.Submission) -> Pl
     """The cells that a submission means. Raises ``GridError`` with every problem found."""
     table: Any = asked.grid if asked.grid is not None else grid.loads(asked.toml or "", asked.origin)
     find = partial(uploads.find, store, artifacts, asked.scenes)
-    return plan.expand(grid.parse(table, find=find, origin=asked.origin))
+    points = partial(uploadedpoints.find, artifacts, asked.points)
+    return plan.expand(grid.parse(table, find=find, points=points, origin=asked.origin))
 
 
 def dry_run(store: Store, wanted: Plan) -> schemas.DryRun:

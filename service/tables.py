@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.text import Text
 
 from jobs.results import Point
+from renderer.catalog import is_replay
 from renderer.metrics import METRICS
 
 SHOWN = ("relmse", "mse_cross", "mse")  # the first that has values stands for the experiment
@@ -20,7 +21,8 @@ def show_errors(points: list[Point]) -> None:
     """
     One table per scene and integrator: the error of every sampler at every spp, mean ± standard error.
 
-    The lowest of a row is bold; spp that a sampler rounded are shown beside its number.
+    Samplers stand side by side where there is room for them, else one below the other. The lowest at each spp is bold,
+    replays left out, which are wrong on purpose; spp that a sampler rounded are shown beside its number.
     """
     metric = next((name for name in SHOWN if any(point.metric == name for point in points)), None)
     if metric is None:
@@ -29,27 +31,44 @@ def show_errors(points: list[Point]) -> None:
     of_metric = [point for point in points if point.metric == metric]
     for scene, integrator in dict.fromkeys((point.scene, point.integrator) for point in of_metric):
         here = [point for point in of_metric if (point.scene, point.integrator) == (scene, integrator)]
-        samplers = list(dict.fromkeys(point.sampler for point in here))
-        table = Table(title=f"{scene} · {integrator}", title_justify="left", box=box.SIMPLE_HEAD)
-        table.add_column("spp", justify="right")
-        for sampler in samplers:
-            table.add_column(sampler, justify="right")
-        for spp in sorted({point.spp for point in here}):
-            found = {point.sampler: point for point in here if point.spp == spp}
-            best = min(point.mean for point in found.values())
-            table.add_row(str(spp), *(_cell(found.get(sampler), best) for sampler in samplers))
+        table = _errors(f"{scene} · {integrator}", here)
+        if console.measure(table, options=console.options.update(width=10_000)).maximum > console.width:
+            table = _errors(f"{scene} · {integrator}", here, below=True)
         console.print(table)
     replicates = sorted({point.n for point in of_metric})
     counts = f"{replicates[0]}" if len(replicates) == 1 else f"{replicates[0]} to {replicates[-1]}"
     console.print(f"{metric} = {METRICS[metric].formula}; mean ± standard error over {counts} replicates")
 
 
-def _cell(point: Point | None, best: float) -> Text:
+def _errors(title: str, points: list[Point], *, below: bool = False) -> Table:
+    """The errors of some samplers, side by side or one ``below`` the other."""
+    samplers = list(dict.fromkeys(point.sampler for point in points))
+    levels = sorted({point.spp for point in points})
+    found = {(point.sampler, point.spp): point for point in points}
+    right = {
+        spp: [point.mean for point in points if point.spp == spp and not is_replay(point.sampler)] for spp in levels
+    }
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    names = [Text(f"{sampler} (replay)" if is_replay(sampler) else sampler) for sampler in samplers]
+    table.add_column("sampler" if below else "spp", justify="left" if below else "right", overflow="fold")
+    for heading in (f"{spp} spp" for spp in levels) if below else names:
+        table.add_column(heading, justify="right")
+    rows = [(name, [(sampler, spp) for spp in levels]) for name, sampler in zip(names, samplers, strict=True)]
+    if not below:
+        rows = [(Text(str(spp)), [(sampler, spp) for sampler in samplers]) for spp in levels]
+    for heading, places in rows:
+        table.add_row(heading, *(_cell(found.get(place), min(right[place[1]], default=None)) for place in places))
+    return table
+
+
+def _cell(point: Point | None, best: float | None) -> Text:
     if point is None:
         return Text("–", style="dim")
     error = f" ± {point.error:.1e}" if point.error is not None else ""
     rounded = f" ({point.spp_actual} spp)" if point.spp_actual != point.spp else ""
-    return Text(f"{point.mean:.3e}{error}{rounded}", style="bold" if point.mean == best else "")
+    return Text(
+        f"{point.mean:.3e}{error}{rounded}", style="bold" if point.mean == best and not is_replay(point.sampler) else ""
+    )
 
 
 def show_experiments(rows: Iterable[tuple[int, str, str, dict[str, int], dict[str, int], int, int, int]]) -> None:
@@ -109,9 +128,13 @@ def show_catalog(values: dict[str, list[dict[str, Any]]]) -> None:
 
 
 def _parameter(item: dict[str, Any]) -> str:
-    default = "from the grid or the scene" if item["default"] is None else str(item["default"]).lower()
-    unit = f" {item['unit']}" if item["unit"] else ""
-    return f"  {item['name']} = {default}{unit}: {item['line']}"
+    default = str(item["default"]).lower()
+    if item["default"] is None:
+        default = item["unset"]
+    unit = f" {item['unit']}" if item["unit"] and item["default"] is not None else ""
+    meanings = zip(item["options"], item["meanings"], strict=True)
+    options = "".join(f"\n    {option}: {meaning}" for option, meaning in meanings if option)
+    return f"  {item['name']} = {default or 'none'}{unit}: {item['line']}{options}"
 
 
 def size(count: float) -> str:

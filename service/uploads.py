@@ -9,7 +9,6 @@ no more bytes than allowed are ever written, whatever the archive claims. Then t
 from __future__ import annotations
 
 import contextlib
-import os
 import stat
 import tempfile
 import zipfile
@@ -27,6 +26,7 @@ from renderer.scenes import sources
 from renderer.scenes.allowed import EXTENSIONS, file_fault
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import SceneSource
+from renderer.zips import MAX_DIRECTORY, directory_bytes
 from service.engine import Engine
 from service.problems import TooLarge
 
@@ -37,8 +37,6 @@ MAX_BYTES = 2**29  # unpacked
 MAX_NAME = 200  # characters
 MAX_PART = 255  # bytes of the name of a file or folder, on any usual file system
 MAX_PATH = 1000  # bytes of a path in an archive
-MAX_DIRECTORY = 2**21  # bytes of an archive's list of files: a kilobyte for each
-END_BYTES = 22  # of the record at the end of an archive, without its comment
 
 
 def receive(engine: Engine, archive: IO[bytes], name: str, main: str | None) -> SceneSource:
@@ -123,7 +121,7 @@ def _main(folder: Path, main: str | None, name: str) -> str:
 
 def _unpack(archive: IO[bytes], root: Path, name: str) -> None:
     """Raises ``SceneError`` for what is no sound archive, ``TooLarge``, and ``OSError`` for the disk alone."""
-    if _directory_bytes(archive) > MAX_DIRECTORY:
+    if directory_bytes(archive) > MAX_DIRECTORY:
         raise TooLarge(f"the archive of {shown(name)} has a list of files of more than {MAX_DIRECTORY >> 20} MiB")
     with _read(name, lambda: zipfile.ZipFile(archive)) as opened:
         entries = [entry for entry in opened.infolist() if not entry.filename.endswith("/")]
@@ -144,23 +142,6 @@ def _read(name: str, step: Callable[[], T]) -> T:
     except Exception as error:
         reason = str(error)[:100] or type(error).__name__
         raise SceneError(f"the archive of {shown(name)} cannot be read ({reason}); send a zip of the folder") from None
-
-
-def _directory_bytes(archive: IO[bytes]) -> int:
-    """
-    How long an archive says that its list of files is; 0 where it says nothing. zipfile makes an object of half a
-    kilobyte of each entry before anybody can count them.
-    """
-    size = archive.seek(0, os.SEEK_END)
-    archive.seek(max(0, size - END_BYTES - 2**16))
-    tail = archive.read()
-    archive.seek(0)
-    end = tail.rfind(b"PK\5\6")
-    if end < 0 or len(tail) < end + END_BYTES:
-        return 0
-    if tail[max(0, end - 20) :].startswith(b"PK\6\7"):
-        return MAX_DIRECTORY + 1  # zip64, for more files than any scene has
-    return int.from_bytes(tail[end + 12 : end + 16], "little")
 
 
 def _fault(entry: zipfile.ZipInfo) -> str | None:

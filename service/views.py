@@ -60,7 +60,10 @@ def detail(store: Store, found: Experiment, engine: Engine) -> schemas.Experimen
         **experiment(store, found, engine), revision=revision, scenes=scenes,
         integrators=[_label("integrator", item) for item in grid["integrators"]],
         samplers=[_label("sampler", item) for item in grid["samplers"]], spp=grid["spp"], sweeps={},
-        replicates=grid["replicates"], metrics=[metric_info(name) for name in METRICS],
+        replicates=grid["replicates"],
+        points={item["file"]: item[catalog.POINTS] for item in grid["samplers"] if catalog.POINTS in item},
+        replays=[text for item in grid["samplers"] if catalog.is_replay(text := _label("sampler", item))],
+        metrics=[metric_info(name) for name in METRICS],
         default_metric=default_metric(store, found.id), toml=toml_of(grid), paths=uploaded,
     )  # fmt: skip
 

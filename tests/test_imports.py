@@ -17,7 +17,7 @@ MAY_IMPORT = {"renderer": set(), "jobs": {"renderer"}, "service": {"jobs", "rend
 WITHOUT_MITSUBA = (
     "renderer.spec", "renderer.catalog", "renderer.errors", "renderer.metrics", "renderer.images", "renderer.variant",
     "renderer.llvm", "renderer.devices", "renderer.previews", "renderer.scenes.sources", "renderer.scenes.builtin",
-    "renderer.scenes.vet",
+    "renderer.scenes.vet", "renderer.samplers.pointfile", "renderer.samplers.packing", "renderer.zips",
 )  # fmt: skip
 
 

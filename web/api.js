@@ -21,6 +21,7 @@
 /** @typedef {Schemas["MetricInfo"]} MetricInfo */
 /** @typedef {Schemas["Overview"]} Overview */
 /** @typedef {Schemas["Point"]} Point */
+/** @typedef {Schemas["PointFile"]} PointFile */
 /** @typedef {Schemas["Problem"]} Problem */
 /** @typedef {Schemas["Progress"]} Progress */
 /** @typedef {Schemas["Scene"]} Scene */
@@ -171,6 +172,11 @@ export const scenes = {
    * @returns {Promise<Scene>}
    */
   upload: (zip, name, main) => postBytes(`/api/scenes${query({ name, main })}`, zip, "application/zip"),
+};
+
+export const points = {
+  /** @param {Blob} npz sets of points, as numpy writes them @param {string} name @returns {Promise<PointFile>} */
+  upload: (npz, name) => postBytes(`/api/points${query({ name })}`, npz, "application/octet-stream"),
 };
 
 export const cells = {

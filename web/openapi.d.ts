@@ -450,6 +450,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/points": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Upload
+         * @description Upload a point file: a numpy archive (.npz) with `points`, float (K, N, 2) or (N, 2) in [0, 1), at most 64 MiB. It
+         *     is kept by its digest; a submission with `pointset:file=NAME` then says `"points": {NAME: digest}`.
+         */
+        post: operations["upload_api_points_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/events": {
         parameters: {
             query?: never;
@@ -554,6 +575,12 @@ export interface components {
              * @description rendered, after the sampler's rounding
              */
             spp_actual: number;
+            /**
+             * Replay
+             * @description its sampler shows a published mistake: never to be recommended
+             * @default false
+             */
+            replay: boolean;
             /**
              * Sweep
              * @default {}
@@ -820,6 +847,20 @@ export interface components {
             paths: {
                 [key: string]: string;
             };
+            /**
+             * Points
+             * @description point files of pointset samplers: name → digest
+             * @default {}
+             */
+            points: {
+                [key: string]: string;
+            };
+            /**
+             * Replays
+             * @description the samplers that show a published mistake, plotted at the spp asked
+             * @default []
+             */
+            replays: string[];
         };
         /** Health */
         Health: {
@@ -886,6 +927,20 @@ export interface components {
             seconds: number | null;
         };
         /**
+         * PointFile
+         * @description A point file that a grid may name: ``sets`` sets of ``count`` points, each a pixel's samples at most.
+         */
+        PointFile: {
+            /** Name */
+            name: string;
+            /** Digest */
+            digest: string;
+            /** Sets */
+            sets: number;
+            /** Count */
+            count: number;
+        };
+        /**
          * Rounded
          * @description A sampler that does not render the spp that was asked.
          */
@@ -941,7 +996,8 @@ export interface components {
         };
         /**
          * Series
-         * @description One curve. ``alike``: all its renders were timed under the same conditions, so its seconds may be compared.
+         * @description One curve. ``replay``: its sampler shows a published mistake; it is drawn, and its slope fitted, at the spp asked.
+         *     ``alike``: all its renders were timed under the same conditions, so its seconds may be compared.
          *     ``floor``: what an exact picture would measure, the noise of the reference; a mean near it says little.
          */
         Series: {
@@ -963,6 +1019,11 @@ export interface components {
             slope: components["schemas"]["Slope"] | null;
             /** Alike */
             alike: boolean;
+            /**
+             * Replay
+             * @default false
+             */
+            replay: boolean;
             /** Floor */
             floor?: number | null;
         };
@@ -1011,7 +1072,8 @@ export interface components {
         /**
          * Submission
          * @description A grid as an object, or as the text of a TOML file; one of the two. ``scenes`` says which uploaded scene
-         *     (``POST /api/scenes``) a name in the grid's ``scenes`` stands for; built-in scenes need no entry.
+         *     (``POST /api/scenes``) a name in the grid's ``scenes`` stands for; built-in scenes need no entry. ``points`` says
+         *     the same of the files of ``pointset`` samplers (``POST /api/points``).
          * @example {
          *       "grid": {
          *         "name": "first",
@@ -1058,6 +1120,13 @@ export interface components {
              * @default {}
              */
             scenes: {
+                [key: string]: string;
+            };
+            /**
+             * Points
+             * @default {}
+             */
+            points: {
                 [key: string]: string;
             };
         };
@@ -3660,6 +3729,114 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["Scene"];
+                };
+            };
+            /** @description the token is missing */
+            401: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description a page of another site */
+            403: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description unknown */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description it does not fit the state of things */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description too large */
+            413: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description another host */
+            421: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description bad value */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the machine lacks something */
+            503: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            /** @description the data directory cannot be used */
+            507: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+        };
+    };
+    upload_api_points_post: {
+        parameters: {
+            query: {
+                /** @description what grids will call it */
+                name: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": string;
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PointFile"];
                 };
             };
             /** @description the token is missing */

@@ -28,6 +28,7 @@ class Order:
     replicates  (role, k) to draw, in this order
     out         folder that gets the pictures
     preview     file (.npy, float16, see render_process.Previews) that refines while the cell renders
+    points      folder of the point files, by digest, that a ``pointset`` sampler reads
     """
 
     order: int
@@ -39,6 +40,7 @@ class Order:
     replicates: tuple[tuple[str, int], ...]
     out: Path
     preview: Path | None = None
+    points: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -146,4 +148,5 @@ def as_json(order: Order) -> dict[str, Any]:
         "replicates": list(order.replicates),
         "out": str(order.out),
         "preview": str(order.preview) if order.preview else None,
+        "points": str(order.points) if order.points else None,
     }

@@ -53,7 +53,8 @@ class LocalExecutor:
     """
     Renders on one device of this machine.
 
-    kernels  folder for the kernel caches, one below it per trust class
+    kernels  folder for the kernel caches, one below it per trust class; the tables of samplers lie in ``tables`` beside
+             it, one folder per trust class too: no scene's process reads what another's wrote
     logs     folder for the log of the render process
     cwd      an empty folder: Mitsuba looks for plugins in the working directory
     Not thread-safe: one thread submits, cancels and reads events (a child dies with the thread that started it).
@@ -151,9 +152,9 @@ class LocalExecutor:
 
     def _start(self, key: tuple[str, str]) -> Child:
         colour, trust = key
-        cache = self.kernels / trust[:16]
+        cache, tables = self.kernels / trust[:16], self.kernels.with_name("tables") / trust[:16]
         try:
-            for folder in (cache, self.logs, self.cwd):
+            for folder in (cache, tables, self.logs, self.cwd):
                 folder.mkdir(parents=True, exist_ok=True)
             log = open(self.logs / "render.log", "a+b")  # noqa: SIM115 - lives as long as the child
         except OSError as error:
@@ -164,6 +165,7 @@ class LocalExecutor:
             **os.environ,
             **self.device.environment,
             "DRJIT_CACHE_DIR": str(cache),
+            "DARTBOARD_TABLES": str(tables),
             "DARTBOARD_OWNER": str(os.getpid()),
             "PYTHONPATH": os.pathsep.join(filter(None, [str(_root()), os.environ.get("PYTHONPATH")])),
             "PYTHONUNBUFFERED": "1",

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from jobs.store import Row
+from renderer import catalog
 from service.report.figures import counted, listed, ratio
 from service.report.panels import Line, Section
 from service.report.reading import Reading
@@ -37,7 +38,8 @@ def findings(reading: Reading, sections: list[Section]) -> list[Finding]:
     lines = [line for section in sections for panel in section.panels for line in panel.lines]
     return [
         *_failures(reading.cells), *_missing(reading), *_biases(sections, lines), *_timings(lines),
-        *_references(reading, sections), *_roundings(lines), *_replicates(reading), *_negative(lines),
+        *_references(reading, sections), *_replays(lines), *_roundings(lines), *_replicates(reading),
+        *_negative(lines),
     ]  # fmt: skip
 
 
@@ -67,11 +69,12 @@ def _missing(reading: Reading) -> Iterator[Finding]:
 
 
 def _biases(sections: list[Section], lines: list[Line]) -> Iterator[Finding]:
-    """The curves whose brightness chance does not explain, each by its clearest point."""
+    """The curves whose brightness chance does not explain, each by its clearest point. Replays are wrong anyway."""
+    lines = [line for line in lines if not line.replay]
     tests = sum(_off(point) > 0 for line in lines for point in line.points[BIAS].values())
     found: list[tuple[float, str]] = []
     for section in sections:
-        for line in (line for panel in section.panels for line in panel.lines):
+        for line in (line for panel in section.panels for line in panel.lines if not line.replay):
             point = max(line.points[BIAS].values(), key=_off, default=None)
             if point and _off(point) > LEAST and tail(_off(point), point["n"] - 1) * tests < CHANCE:
                 found.append((_off(point), _bias(section.scene, line, point)))
@@ -121,9 +124,21 @@ def _references(reading: Reading, sections: list[Section]) -> Iterator[Finding]:
         )
 
 
+def _replays(lines: list[Line]) -> Iterator[Finding]:
+    """Each sampler that is wrong on purpose, with what is wrong."""
+    for sampler in dict.fromkeys(line.sampler for line in lines if line.replay):
+        yield Finding(
+            "note",
+            f"{sampler} is a replay: it shows a published mistake ({catalog.mistake(sampler)}), at the spp that was "
+            "asked, and is in no comparison.",
+        )
+
+
 def _roundings(lines: list[Line]) -> Iterator[Finding]:
     ways: dict[str, dict[str, None]] = {}
     for line in lines:
+        if line.replay:
+            continue
         changed = {cell["spp"]: cell["spp_actual"] for cell in line.cells.values() if cell["spp_actual"] != cell["spp"]}
         if changed:
             text = ", ".join(f"{asked} → {changed[asked]}" for asked in sorted(changed))

@@ -18,8 +18,8 @@ from service.report.reading import Reading
 
 FORMAT = 1  # grows when a key changes its meaning
 CELL_KEYS = (
-    "cell", "digest", "role", "scene", "integrator", "sampler", "spp", "spp_actual", "sweep", "state", "had", "wanted",
-    "reference", "seconds", "error_class", "error",
+    "cell", "digest", "role", "scene", "integrator", "sampler", "spp", "spp_actual", "replay", "sweep", "state", "had",
+    "wanted", "reference", "seconds", "error_class", "error",
 )  # fmt: skip
 
 

@@ -31,11 +31,13 @@ class Line:
     points  metric → spp that was asked → ``schemas.Point``
     slopes  metric → ``schemas.Slope`` or None
     alike   its renders were timed under the conditions that most of the experiment's were
+    replay  its sampler shows a published mistake: it is shown, and never best
     """
 
     integrator: str
     sampler: str
     name: str
+    replay: bool = False
     cells: dict[int, Row] = field(default_factory=dict)
     points: dict[str, dict[int, Row]] = field(default_factory=lambda: {metric: {} for metric in METRICS})
     slopes: dict[str, Row | None] = field(default_factory=lambda: dict.fromkeys(METRICS))
@@ -71,8 +73,8 @@ class Panel:
 
     @property
     def baseline(self) -> Line:
-        """What the others are compared with: the grid's first sampler, with its first integrator."""
-        return self.lines[0]
+        """What the others are compared with: the grid's first sampler that is no replay, with its first integrator."""
+        return next((line for line in self.lines if not line.replay), self.lines[0])
 
     @property
     def alike(self) -> bool:
@@ -98,14 +100,14 @@ class Panel:
         return max(shared, default=None)
 
     def lowest(self, metric: str, spp: int) -> float | None:
-        """The best error at that spp; None where there is nothing to choose from."""
+        """The best error at that spp, replays left out; None where there is nothing to choose from."""
         return self._lowest.get((metric, spp))
 
     @cached_property
     def _lowest(self) -> dict[tuple[str, int], float]:
         found: dict[tuple[str, int], list[float]] = {}
         for line in self.lines:
-            for metric, points in line.points.items():
+            for metric, points in line.points.items() if not line.replay else ():
                 for spp, point in points.items():
                     found.setdefault((metric, spp), []).append(point["mean"])
         return {key: min(means) for key, means in found.items() if len(means) > 1 and METRICS[key[0]].lower_is_better}
@@ -158,7 +160,7 @@ def _panel(name: str, cells: list[Row], series: dict[str, dict[str, Row]], refer
 
 def _line(cell: Row, series: dict[str, dict[str, Row]], *, alone: bool) -> Line:
     sampler, integrator = cell["sampler"], cell["integrator"]
-    line = Line(integrator, sampler, sampler if alone else f"{sampler} with {integrator}")
+    line = Line(integrator, sampler, sampler if alone else f"{sampler} with {integrator}", cell["replay"])
     for metric, found in series.get(_curve(cell), {}).items():
         line.points[metric] = {point["spp"]: point for point in found["points"]}
         line.slopes[metric] = found["slope"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +12,8 @@ from renderer.scenes.builtin import BUILTIN, BuiltinScene
 from renderer.spec import Choice
 from service.report.panels import label
 from service.report.reading import Reading
+
+DIGEST_SHOWN = 16  # hexadecimal digits
 
 
 @dataclass(frozen=True)
@@ -82,9 +85,16 @@ def _plugin(axis: str, item: Row, spp: list[int]) -> Plugin:
     entry = catalog.find(axis, choice.name)
     return Plugin(
         catalog.label(axis, choice), entry.line, entry.source,
-        [(key, _shown(value)) for key, value in choice.parameters],
+        [(key, _shown(value)) for key, value in _told(choice)],
         [(asked, catalog.rendered_spp(choice, asked)) for asked in spp],
     )  # fmt: skip
+
+
+def _told(choice: Choice) -> Iterator[tuple[str, Any]]:
+    """What is set, with a digest as long as it takes to tell files apart."""
+    for key, value in choice.parameters:
+        if value != "":
+            yield key, str(value)[:DIGEST_SHOWN] if key == catalog.POINTS else value
 
 
 def _shown(value: Any) -> str:

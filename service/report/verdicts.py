@@ -38,6 +38,11 @@ class Verdict:
         """The measured curves in the order of the panel."""
         return self.panel.measured(self.metric)
 
+    @property
+    def compared(self) -> list[Line]:
+        """Those that the best is chosen among: a replay, which is wrong on purpose, is in no comparison."""
+        return [line for line in self.rows if not line.replay]
+
     def point(self, line: Line) -> Row:
         return line.points[self.metric][self.spp]
 
@@ -49,6 +54,8 @@ class Verdict:
 
     def standing(self, line: Line) -> str:
         """How a curve compares with the best one."""
+        if line.replay:
+            return "a replay"
         if line is self.best:
             return "lowest"
         if self.tied is None:
@@ -58,7 +65,7 @@ class Verdict:
     @property
     def certain(self) -> bool:
         """Whether the best is told apart from every other curve."""
-        return self.tied == [] and len(self.rows) > 1
+        return self.tied == [] and len(self.compared) > 1
 
 
 def verdict(panel: Panel, metric: str) -> Verdict | None:
@@ -67,8 +74,9 @@ def verdict(panel: Panel, metric: str) -> Verdict | None:
     if spp is None:
         return None
     lines = panel.measured(metric)
-    best = min(lines, key=lambda line: line.points[metric][spp]["mean"])
-    known = [(line, apart(best.points[metric][spp], line.points[metric][spp])) for line in lines if line is not best]
+    right = [line for line in lines if not line.replay] or lines
+    best = min(right, key=lambda line: line.points[metric][spp]["mean"])
+    known = [(line, apart(best.points[metric][spp], line.points[metric][spp])) for line in right if line is not best]
     tied = None if any(found is None for _, found in known) else [line for line, found in known if not found]
     return Verdict(panel, metric, spp, best, tied)
 
@@ -82,8 +90,10 @@ def apart(one: Row, other: Row) -> bool | None:
 
 def sentences(found: Verdict) -> list[str]:
     """A verdict in plain words."""
-    if len(found.rows) == 1:
-        only = found.rows[0]
+    if not found.compared:
+        return ["There are only replays here, which show published mistakes: none is to be chosen.", *_slopes(found)]
+    if len(found.compared) == 1:
+        only = found.compared[0]
         return [f"{only.name} reaches {value(found.point(only))} at {_spp(found, only)}.", *_slopes(found)]
     return [_lowest(found), _certainty(found), *_slopes(found)]
 
@@ -106,8 +116,8 @@ def _certainty(found: Verdict) -> str:
     if found.tied is None:
         return "With one replicate nobody can say how sure that is."
     if not found.tied:
-        return f"Its {P95} interval is apart from {'all others' if len(found.rows) > 2 else 'the other'}."
-    every = len(found.tied) == len(found.rows) - 1 > 1
+        return f"Its {P95} interval is apart from {'all others' if len(found.compared) > 2 else 'the other'}."
+    every = len(found.tied) == len(found.compared) - 1 > 1
     names = "all others" if every else "that of " + listed((line.name for line in found.tied), MOST_NAMED)
     base = found.panel.baseline
     if base in found.tied or found.best is base:
@@ -117,7 +127,7 @@ def _certainty(found: Verdict) -> str:
 
 def _slopes(found: Verdict) -> list[str]:
     """How fast the errors fall: the steepest curve, and the baseline."""
-    fitted = [(line, slope) for line in found.rows if (slope := line.slopes[found.metric])]
+    fitted = [(line, slope) for line in found.compared or found.rows if (slope := line.slopes[found.metric])]
     if not fitted:
         return []
     if len(fitted) == 1:
@@ -144,7 +154,7 @@ def _spp(found: Verdict, line: Line) -> str:
 
 def overall(found: list[Verdict]) -> str | None:
     """One sentence over all panels with something to choose from; None for fewer than two."""
-    chosen = [one for one in found if len(one.rows) > 1]
+    chosen = [one for one in found if len(one.compared) > 1]
     if len(chosen) < 2:
         return None
     wins = Counter(one.best.sampler for one in chosen)

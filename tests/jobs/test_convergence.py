@@ -53,6 +53,23 @@ def test_there_is_a_curve_per_scene_integrator_and_sampler_in_the_order_of_the_p
     assert convergence.curves(store, experiment.id, "mse", "no such scene") == []
 
 
+def test_a_replay_is_read_against_the_spp_that_were_asked(store):
+    """One cell of 16 spp that is wanted at four: its error does not fall, and that is what its slope says."""
+    experiment = submit(
+        store, samplers=["poissondisk:replay=ignore_spp", "stratified"], spp=[4, 8, 16, 64], replicates=4
+    )
+    draw_all(store)
+    guess(store, lambda pair, name: 1.0 + pair["replicate_id"] % 4)
+    flat, right = convergence.curves(store, experiment.id, "relmse")
+    assert (flat.replay, right.replay) == (True, False)
+    assert [(point["spp"], point["spp_actual"]) for point in flat.points] == [(4, 16), (8, 16), (16, 16), (64, 16)]
+    assert len({point["cell"] for point in flat.points}) == 1
+    assert len({(point["mean"], point["error"], point["n"]) for point in flat.points}) == 1
+    assert flat.slope is not None and flat.slope.value == pytest.approx(0, abs=1e-12)
+    assert flat.slope.low < 0 < flat.slope.high
+    assert right.slope == slope(right.points)
+
+
 def test_a_point_has_the_interval_of_its_mean(store):
     experiment = submit(store, spp=[1, 2, 4], replicates=4)
     draw_all(store)

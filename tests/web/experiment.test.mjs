@@ -4,6 +4,7 @@ import { readFileSync } from "node:fs";
 import { test } from "node:test";
 
 import { layout, traces, unplottable } from "../../web/plots/convergence.js";
+import { REPLAY_DASH } from "../../web/plots/plan.js";
 import { axesOf, CellIndex, placeOf } from "../../web/views/experiment/axes.js";
 import { combined, tail } from "../../web/views/experiment/chance.js";
 import { asText, columnsOf, matching, nextSort, ordered } from "../../web/views/experiment/columns.js";
@@ -21,7 +22,7 @@ const SCENES = ["box", "~odd%name"];
 
 const DETAIL = {
   id: 1, name: "grid", state: "done", created_at: "2026-01-01T00:00:00Z", cells: {}, references: {}, had: 0, wanted: 0,
-  failed: 0, seconds_left: null, revision: 1, toml: "", paths: {}, replicates: 4,
+  failed: 0, seconds_left: null, revision: 1, toml: "", paths: {}, points: {}, replays: [], replicates: 4,
   scenes: SCENES.map((name) => ({ name, width: 64, height: 48, reference: "path, independent, 2 × 512 spp" })),
   integrators: ["path", "direct"], samplers: ["independent", "stratified", "halton:a=1,b=2"], spp: [4, 16],
   sweeps: { "sphere.nu": [10, 1000] }, metrics: [RELMSE, RATIO], default_metric: "relmse",
@@ -336,6 +337,49 @@ test("curves lie at the spp that was rendered, one for each series, on axes that
         assert.equal(places.size, arrange === "multiples" ? 6 : 1);
         if (x === "spp") assert.deepEqual(curves(data)[0].x, [5, 9, 16]);
       }
+});
+
+test("a replay lies at the spp that was asked, dashed and named, whatever it rendered", () => {
+  const wrong = (series) => ({
+    ...series,
+    replay: series.sampler !== "stratified",
+    points: series.points.map((point) => ({ ...point, spp_actual: 16 })),
+  });
+  for (const arrange of ["overlay", "multiples"]) {
+    const data = convergence(RELMSE, wrong);
+    const drawn = curves(traces(data, { arrange }));
+    assert.equal(drawn.length, 6);
+    for (const one of drawn) {
+      const replay = !one.name.startsWith("stratified");
+      assert.deepEqual(one.x, replay ? [4, 9, 16] : [16, 16, 16]);
+      assert.equal(one.line.dash === REPLAY_DASH, replay);
+      for (const text of [one.name, ...one.text]) assert.equal(text.includes("(replay)"), replay, text);
+    }
+    const figure = layout(data, { arrange, width: 2000 });
+    assert.match(JSON.stringify(figure), /replays: as asked/);
+    assert.doesNotMatch(JSON.stringify(layout(convergence(), { arrange })), /replay/);
+    assert.deepEqual(figure.xaxis.tickvals, [4, 9, 16]);
+    const timed = curves(traces(data, { arrange, x: "seconds" }));
+    assert.deepEqual(timed[0].x, timed[1].x, "seconds are seconds");
+  }
+});
+
+test("a replay is never the best, nor tied with it", () => {
+  const cells = grid().filter(({ scene, integrator, spp, sweep }) => scene === SCENES[1] && integrator === "path" && spp === 16);
+  const [one, two, three] = cells;
+  one.metrics.relmse = [0.001, 0.0001, 4];
+  one.replay = true;
+  two.metrics.relmse = [0.002, 0.0001, 4];
+  three.metrics.relmse = [0.004, 0.0001, 4];
+  assert.deepEqual([...ranks(cells, RELMSE)], [[two.position, "best"]]);
+});
+
+test("a replay is a finding once, and its bias none", () => {
+  const name = "poissondisk:replay=zeros";
+  const cells = grid((cell) => (cell.sampler === "stratified" ? { ...cell, sampler: name, replay: true, metrics: { ...cell.metrics, mean_ratio: [0.5, 0.001, 4] } } : cell));
+  const found = findings(DETAIL, cells, []).filter(({ text }) => text.includes("replay"));
+  assert.deepEqual(found.map(({ kind }) => kind), ["note"]);
+  assert.match(found[0].text, /published mistake on purpose/);
 });
 
 test("what a logarithmic axis cannot show is left out and counted", () => {

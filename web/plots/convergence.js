@@ -4,11 +4,12 @@
  *
  * Both axes are logarithmic: independent samples fall with slope −1 in a mean squared error, and a better point set
  * shows as a steeper line. In small multiples every panel repeats all curves in grey, unless they are many, so that each is read
- * against the rest. Points lie at the spp that was rendered; a point in the reference's own noise is hollow.
+ * against the rest. Points lie at the spp that was rendered, those of replays at what was asked; a point in the reference's own
+ * noise is hollow.
  *
  * Pure; the exported report inlines this very file and `plan.js`.
  */
-import { chosen, isLog, isNoise, planOf, xOf } from "./plan.js";
+import { along, chosen, isLog, isNoise, planOf, xOf } from "./plan.js";
 
 /** @typedef {import("../api.js").Convergence} Convergence */
 /** @typedef {import("../api.js").Series} Series */
@@ -70,7 +71,7 @@ export function layout(convergence, options = {}) {
       domain: share(column, plan.columns, COLUMN_GAP),
       anchor: axisName("y", plan.rows - 1),
       ...(column ? { matches: "x" } : {}),
-      ...(multiples ? {} : { title: { text: xTitle(options), standoff: 10 } }),
+      ...(multiples ? {} : { title: { text: xTitle(plan, options), standoff: 10 } }),
     };
   }
   for (let row = 0; row < plan.rows; row++) {
@@ -114,7 +115,7 @@ function context(panel, plan, options) {
   const others = plan.curves.filter((curve) => !panel.curves.includes(curve));
   return {
     ...quiet(panel),
-    x: others.flatMap((curve) => [...curve.points.map((point) => xOf(point, options)), null]),
+    x: others.flatMap((curve) => [...along([curve], options), null]),
     y: others.flatMap((curve) => [...curve.points.map((point) => point.mean), null]),
     line: { color: plan.ink.context, width: 1.2 },
   };
@@ -131,7 +132,7 @@ function bands(panel, plan, options) {
     const fill = fills.get(colour) ?? { x: [], y: [] };
     fills.set(colour, fill);
     const low = points.map((point) => (plan.log && reachesZero(point) ? point.mean ** 2 / Number(point.high) : Number(point.low)));
-    const x = points.map((point) => xOf(point, options));
+    const x = points.map((point) => xOf(curve.series, point, options));
     fill.x.push(...x, ...x.toReversed(), null);
     fill.y.push(...points.map((point) => point.high), ...low.reverse(), null);
   }
@@ -149,7 +150,7 @@ function line(curve, panel, convergence, plan, options) {
     mode: plan.curves.length > MARKED ? "lines" : "lines+markers",
     ...axesOf(panel),
     name: `${safe(nameOf(series))}  ${plan.log ? slopeText(series.slope) : ""}`.trimEnd(),
-    x: points.map((point) => xOf(point, options)),
+    x: along([curve], options),
     y: points.map((point) => point.mean),
     customdata: points.map((point) => point.cell),
     text: points.map((point) => hover(series, point, convergence, fair)),
@@ -201,7 +202,7 @@ function hover(series, point, convergence, fair) {
 /** @param {Series} series */
 function nameOf(series) {
   const sweep = Object.entries(series.sweep ?? {}).map(([name, value]) => `${name} = ${JSON.stringify(value)}`);
-  return [series.sampler, series.integrator, ...sweep].join(" · ");
+  return [series.sampler, series.integrator, ...sweep].join(" · ") + (series.replay ? " (replay)" : "");
 }
 
 /** px. @param {Plan} plan @param {Options} options */
@@ -220,9 +221,9 @@ function panelWidth({ columns }, options) {
   return ((options.width ?? 900) - LEFT - RIGHT) * share(0, columns, COLUMN_GAP)[1];
 }
 
-/** Labels at the spp that were rendered, as far as there is room. @param {Plan} plan @param {Options} options */
+/** Labels at the spp that the points have, as far as there is room. @param {Plan} plan @param {Options} options */
 function sppTicks(plan, options) {
-  const spp = [...new Set(plan.curves.flatMap((curve) => curve.points.map((point) => point.spp_actual)))].sort((a, b) => a - b);
+  const spp = [...new Set(along(plan.curves, options))].sort((a, b) => a - b);
   const least = (TICK * (plan.x[1] - plan.x[0])) / panelWidth(plan, options);
   /** @type {number[]} */
   const kept = [];
@@ -283,7 +284,7 @@ function panelTexts(plan, convergence, options) {
   return [
     ...plan.panels.map((panel) => title(panel.title, panel.column, panel.row)),
     ...plan.heads.map((head, column) => ({ ...title(head, column, 0), yshift: TITLE, font: { size: 12, color: plan.ink.muted } })),
-    { ...common, text: xTitle(options), x: 0.5, y: 0, xanchor: "center", yanchor: "top", yshift: -28 },
+    { ...common, text: xTitle(plan, options), x: 0.5, y: 0, xanchor: "center", yanchor: "top", yshift: -28 },
     { ...common, text: convergence.metric.name, x: 0, y: 0.5, xanchor: "right", yanchor: "middle", xshift: -44, textangle: -90 },
   ];
 }
@@ -319,9 +320,10 @@ function unity(panel, plan) {
   return { type: "line", xref: `${xaxis} domain`, yref: yaxis, x0: 0, x1: 1, y0: 1, y1: 1, line, layer: "below" };
 }
 
-/** @param {Options} options */
-function xTitle(options) {
-  return options.x === "seconds" ? "seconds a picture, without compiling" : "samples per pixel, as rendered";
+/** @param {Plan} plan @param {Options} options */
+function xTitle({ curves }, options) {
+  if (options.x === "seconds") return "seconds a picture, without compiling";
+  return `samples per pixel, as rendered${curves.some(({ series }) => series.replay) ? " (replays: as asked)" : ""}`;
 }
 
 /** @param {Panel} panel */

@@ -2,7 +2,8 @@
 /**
  * What a convergence plot shows: which curves in which panels, over which ranges, with which guides and noise floors.
  *
- * Colour tells samplers apart; dash and marker tell integrators apart. Ranges follow the means, so that one wide interval does
+ * Colour tells samplers apart; dash and marker tell integrators apart. A replay, a sampler that shows a published mistake, has a
+ * dash of its own and stands at the spp that was asked, as its authors read it. Ranges follow the means, so that one wide interval does
  * not flatten every curve. Pure; `convergence.js` draws it.
  */
 /** @typedef {import("../api.js").Convergence} Convergence */
@@ -49,6 +50,8 @@ export const PALETTE = {
   light: ["#1f63c9", "#b35900", "#007a57", "#b8246b", "#7d6a00", "#6f3bd1", "#c0341d", "#00788c", "#59616e", "#4c7a00"],
 };
 export const DASHES = ["solid", "dash", "dot", "dashdot", "longdash", "longdashdot"];
+/** Of replays, whatever their integrator. */
+export const REPLAY_DASH = "5px,4px";
 export const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "x", "pentagon"];
 /** What a mean squared error may fall with: independent samples, and better point sets on smooth pictures. */
 export const GUIDES = [-1, -1.5, -2];
@@ -92,8 +95,9 @@ export function planOf(convergence, options) {
   const curves = chosen(convergence, options).map((series) => ({
     series,
     ...styleOf(series, { ...options, samplers, integrators }),
+    ...(series.replay ? { dash: REPLAY_DASH } : {}),
     fair: series.alike || options.x !== "seconds",
-    points: series.points.filter((point) => xOf(point, options) > 0 && (point.mean > 0 || !log)),
+    points: series.points.filter((point) => xOf(series, point, options) > 0 && (point.mean > 0 || !log)),
   }));
   const grid = options.arrange === "multiples" && curves.length ? panelsOf(curves, options) : overlay(curves);
   const ranges = rangesOf(curves, log, options);
@@ -118,7 +122,7 @@ function panelsOf(curves, options) {
     .filter((pair) => matrix || pair.curves.length);
   const columns = matrix ? integrators.length : Math.min(fit, filled.length);
   const panels = filled.map(({ sampler, integrator, curves: own }, i) => ({
-    title: matrix || integrators.length === 1 ? sampler : samplers.length === 1 ? integrator : `${sampler} · ${integrator}`,
+    title: replayed(own) + (matrix || integrators.length === 1 ? sampler : samplers.length === 1 ? integrator : `${sampler} · ${integrator}`),
     row: Math.floor(i / columns),
     column: i % columns,
     curves: own,
@@ -126,11 +130,16 @@ function panelsOf(curves, options) {
   return { rows: Math.ceil(filled.length / columns), columns, heads: matrix ? integrators : [], panels };
 }
 
+/** The word before the title of a panel that shows a mistake: first, since long titles are cut. @param {readonly Curve[]} curves */
+function replayed(curves) {
+  return curves.some(({ series }) => series.replay) ? "replay: " : "";
+}
+
 /** @param {readonly Curve[]} curves @param {boolean} log @param {Options} options @returns {{x: [number, number], y: [number, number]}} */
 function rangesOf(curves, log, options) {
   const points = curves.flatMap((curve) => curve.points);
   if (!points.length) return { x: [0, 2], y: log ? [-3, 0] : [0.9, 1.1] };
-  const x = padded(points.map((point) => Math.log10(xOf(point, options))), 0.06, 0.12);
+  const x = padded(along(curves, options).map(Math.log10), 0.06, 0.12);
   if (log) {
     // The noise of a reference belongs into the picture where it has swallowed a point.
     const noise = curves.flatMap(({ series, points: own }) => (own.some((point) => isNoise(series, point)) ? [Number(series.floor)] : []));
@@ -154,8 +163,8 @@ export function isNoise(series, point) {
 /** Lines of known slope, from above the first points to the last or to the lower edge. @param {readonly Curve[]} curves @param {{y: [number, number]}} ranges @param {Options} options @returns {Plan["guides"]} */
 function guidesIn(curves, ranges, options) {
   const points = curves.flatMap((curve) => curve.points);
-  const along = points.map((point) => xOf(point, options));
-  const [x0, x1] = [Math.min(...along), Math.max(...along)];
+  const places = along(curves, options);
+  const [x0, x1] = [Math.min(...places), Math.max(...places)];
   if (!(x1 > x0)) return [];
   const y0 = 1.25 * Math.max(...points.map((point) => point.mean));
   const floor = 10 ** ranges.y[0];
@@ -165,8 +174,14 @@ function guidesIn(curves, ranges, options) {
   });
 }
 
-/** @param {Point} point @param {Options} options @returns {number} NaN where it was not timed */
-export function xOf(point, options) {
-  return options.x === "seconds" ? point.seconds ?? NaN : point.spp_actual;
+/** Of all points of some curves. @param {readonly Curve[]} curves @param {Options} options @returns {number[]} */
+export function along(curves, options) {
+  return curves.flatMap(({ series, points }) => points.map((point) => xOf(series, point, options)));
+}
+
+/** @param {Series} series @param {Point} point of it @param {Options} options @returns {number} NaN where it was not timed */
+export function xOf(series, point, options) {
+  if (options.x === "seconds") return point.seconds ?? NaN;
+  return series.replay ? point.spp : point.spp_actual;
 }
 

@@ -13,10 +13,11 @@ import { toast } from "../parts/toast.js";
 import { readCatalog } from "./new/catalog.js";
 import { faultsOf, useDryRun } from "./new/dryrun.js";
 import { Section, TextField } from "./new/fields.js";
-import { fromQuery, suggestedName, toQuery, toSubmission } from "./new/form.js";
+import { fromQuery, suggestedName, toQuery, toSubmission, uploads } from "./new/form.js";
 import { Panel } from "./new/panel.js";
 import { Plugins } from "./new/plugins.js";
 import { formOf, tomlOf } from "./new/prefill.js";
+import { Replays } from "./new/replays.js";
 import { Scenes } from "./new/scenes.js";
 import { GridEditor } from "./new/text.js";
 import { Pictures, ReferenceFields, Spp } from "./new/values.js";
@@ -62,7 +63,8 @@ export function New() {
 function prefill(experiment) {
   const form = formOf(experiment);
   const text = form ? null : tomlOf(experiment);
-  setParams({ from: null, ...(form && toQuery(form)), tab: text && "toml", toml: text });
+  const points = Object.entries(experiment.points).map(([name, digest]) => `${name}@${digest}`);
+  setParams({ from: null, points, ...(form && toQuery(form)), tab: text && "toml", toml: text });
 }
 
 /** @param {{catalog: Catalog, scenes: readonly Scene[]}} props */
@@ -76,7 +78,7 @@ function Editor({ catalog, scenes }) {
   const form = fromQuery(params);
   const typing = tab === "toml";
   const text = params.get("toml") ?? long;
-  const submission = typing ? textSubmission(text, known) : toSubmission(form);
+  const submission = typing ? textSubmission(text, known, form.points) : toSubmission(form);
   const estimate = useDryRun(submission);
   const [formText, setFormText] = useState(/** @type {string | null} */ (null));
   useEffect(() => {
@@ -137,13 +139,12 @@ function Editor({ catalog, scenes }) {
 }
 
 /**
- * A grid as text, with every uploaded scene that it may name; null without any text.
- * @param {string} text @param {readonly Scene[]} known @returns {Submission | null}
+ * A grid as text, with every uploaded scene and point file that it may name; null without any text.
+ * @param {string} text @param {readonly Scene[]} known @param {Form["points"]} points @returns {Submission | null}
  */
-function textSubmission(text, known) {
-  const own = known.filter(({ builtin }) => !builtin);
-  const uploads = Object.fromEntries(own.map(({ name, digest }) => [name, digest]));
-  return text.trim() ? { toml: text, origin: "grid.toml", scenes: uploads } : null;
+function textSubmission(text, known, points) {
+  const scenes = uploads(known.filter(({ builtin }) => !builtin));
+  return text.trim() ? { toml: text, origin: "grid.toml", scenes, points: uploads(points) } : null;
 }
 
 /**
@@ -178,7 +179,13 @@ function FormFields({ form, change, catalog, known, faults, onUploaded }) {
       />
     <//>
     <${Section} id="samplers" title="Samplers" hint=${HINTS.samplers} faults=${faults} aside=${chosen(samplers)}>
-      <${Plugins} entries=${catalog.samplers} chosen=${samplers} onChange=${set("samplers")} />
+      <${Plugins}
+        entries=${catalog.samplers}
+        chosen=${samplers}
+        points=${form.points}
+        onChange=${(/** @type {Form["samplers"]} */ next, sent = form.points) => change({ samplers: next, points: sent })}
+      />
+      <${Replays} entries=${catalog.samplers} chosen=${samplers} onChange=${set("samplers")} />
     <//>
     <${Section}
       id="integrators"

@@ -120,7 +120,8 @@ def test_a_trust_class_never_shares_a_process(executor: LocalExecutor, make_orde
         assert executor.child is not None
         children.append(executor.child.process.pid)
     assert children[0] != children[1]
-    assert {folder.name for folder in executor.kernels.iterdir()} == {"builtin", "0123456789abcdef"}
+    for caches in (executor.kernels, executor.kernels.with_name("tables")):
+        assert {folder.name for folder in caches.iterdir()} == {"builtin", "0123456789abcdef"}
 
 
 def test_a_scene_that_cannot_be_loaded_fails_without_the_process(

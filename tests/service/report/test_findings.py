@@ -11,7 +11,7 @@ from service.report.findings import findings
 from service.report.panels import sections
 from service.report.reading import read
 from service.report.student import tail
-from tests.service.report.conftest import finished
+from tests.service.report.conftest import finished, numbers_of, page_of
 
 
 def told(store, artifacts, experiment) -> list[tuple[str, str]]:
@@ -54,6 +54,32 @@ def test_times_of_another_machine_are_a_warning(store, artifacts):
     store.connection.execute("update point set conditions = 'elsewhere' where position = 0 and name = 'render_seconds'")
     [(kind, text)] = told(store, artifacts, experiment)
     assert kind == "warn" and "cannot be compared: independent · path" in text
+
+
+def test_a_replay_is_told_with_its_mistake_and_blamed_for_nothing_else(store, artifacts):
+    """Not for its bias, nor for its rounding: both are what it shows."""
+    samplers = ["independent", "poissondisk:replay=ignore_spp", "poissondisk:replay=zeros"]
+    experiment = finished(store, artifacts, samplers=samplers, spp=[4, 16, 64])
+    change = "update point set mean = 0.5, error = 0.001 where name = 'mean_ratio' and position in (1, 2)"
+    store.connection.execute(change)
+    found = told(store, artifacts, experiment)
+    assert [kind for kind, _ in found] == ["note", "note"]
+    assert found[0][1].startswith(
+        "poissondisk:replay=ignore_spp is a replay: it shows a published mistake (renders 16 samples per pixel, "
+    )
+    assert "poissondisk:replay=zeros is a replay" in found[1][1] and "(0, 0)" in found[1][1]
+
+
+def test_the_report_marks_replays_wherever_they_stand(store, artifacts):
+    samplers = ["independent", "poissondisk:replay=ignore_spp"]
+    page, html = page_of(store, artifacts, finished(store, artifacts, samplers=samplers, spp=[4, 16, 64]))
+    marks = [found for tag, found in page.elements if tag == "span" and found.get("class") == "replay"]
+    assert len(marks) >= 4 and all("published mistake" in (found["title"] or "") for found in marks)
+    data = numbers_of(html)
+    flat = [one for one in data["convergence"]["relmse"]["series"] if one["replay"]]
+    assert [one["sampler"] for one in flat] == ["poissondisk:replay=ignore_spp"]
+    assert [(point["spp"], point["spp_actual"]) for point in flat[0]["points"]] == [(4, 16), (16, 16), (64, 16)]
+    assert "replay" in data["cells"]["columns"]
 
 
 def test_samplers_that_round_are_a_note(store, artifacts):

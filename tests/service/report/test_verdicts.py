@@ -57,6 +57,29 @@ def test_the_lowest_is_named_with_its_ratio_to_the_baseline():
     assert "Its 95 % interval is apart from the other." in text
 
 
+def replayed(one: Line) -> Line:
+    one.replay = True
+    return one
+
+
+def test_a_replay_is_never_the_best_and_in_no_comparison():
+    wrong = replayed(line("poissondisk:replay=zeros", point(0.001, 0.0001), slope=(-3.0, -3.1, -2.9)))
+    right = [line("independent", point(0.03, 0.001), slope=(-1.0, -1.1, -0.9)), line("sobol", point(0.01, 0.001))]
+    assert said(wrong, *right) == said(*right), "it changes nothing that is said about the others"
+    found = verdict(panel(wrong, *right), "relmse")
+    assert found is not None and found.best is right[1] and found.panel.baseline is right[0]
+    assert [found.standing(one) for one in found.rows] == ["a replay", "apart from the lowest", "lowest"]
+    assert panel(wrong, *right).lowest("relmse", 64) == 0.01
+    assert overall([found, found]) == overall([verdict(panel(*right), "relmse")] * 2)
+
+
+def test_where_there_are_only_replays_nothing_is_recommended():
+    text = said(replayed(line("a:replay=zeros", point(0.001, 0.0001))), replayed(line("b", point(0.002, 0.0001))))
+    assert text == "There are only replays here, which show published mistakes: none is to be chosen."
+    alone = said(replayed(line("a:replay=zeros", point(0.001, 0.0001))), line("independent", point(0.03, 0.001)))
+    assert alone.startswith("independent reaches 3.00e-2")
+
+
 def test_what_overlaps_is_named():
     lines = [line("a", point(0.03, 0.001)), line("b", point(0.011, 0.002)), line("c", point(0.01, 0.001))]
     assert "Its 95 % interval is apart from that of a, but overlaps that of b." in said(*lines)

@@ -26,7 +26,7 @@ export function columnsOf(detail) {
   return [
     { name: "scene", title: "scene", numeric: false, width: widthOf(detail.scenes.map((scene) => scene.name)), value: (cell) => cell.scene },
     { name: "integrator", title: "integrator", numeric: false, width: widthOf(detail.integrators), value: (cell) => cell.integrator },
-    { name: "sampler", title: "sampler", numeric: false, width: widthOf(detail.samplers), value: (cell) => cell.sampler },
+    { name: "sampler", title: "sampler", numeric: false, width: widthOf(detail.samplers, detail.replays.length ? 300 : 190), value: (cell) => cell.sampler },
     ...Object.keys(detail.sweeps).map((parameter) => ({
       name: parameter,
       title: parameter,
@@ -82,8 +82,8 @@ export function columnsOf(detail) {
 }
 
 /** px for the longest of some texts, within reason. @param {readonly string[]} texts */
-function widthOf(texts) {
-  return Math.min(190, Math.max(84, 20 + 7.6 * Math.max(...texts.map((text) => text.length))));
+function widthOf(texts, most = 190) {
+  return Math.min(most, Math.max(84, 20 + 7.6 * Math.max(...texts.map((text) => text.length))));
 }
 
 /** Swept numbers sort as numbers. @param {string | null} value */

@@ -33,7 +33,8 @@ export function ratioTo(cell, baseline, metric) {
 
 /**
  * Which cells of a line are best: among those of one reference that were rendered with equally many samples, the lowest
- * error and whatever cannot be told from it. A cell without company has no rank.
+ * error and whatever cannot be told from it. A cell without company has no rank, and a replay, which shows a mistake, none
+ * in any company.
  * @param {readonly Cell[]} cells @param {MetricInfo} metric @returns {Map<number, Rank>} by position
  */
 export function ranks(cells, metric) {
@@ -45,7 +46,7 @@ export function ranks(cells, metric) {
   const groups = new Map();
   for (const cell of cells) {
     const estimate = estimateOf(cell, metric.name);
-    if (!estimate || cell.reference === null || cell.reference === undefined) continue;
+    if (!estimate || cell.reference === null || cell.reference === undefined || cell.replay) continue;
     const alike = `${cell.reference} ${cell.spp_actual}`;
     const group = groups.get(alike) ?? [];
     group.push({ cell, estimate });

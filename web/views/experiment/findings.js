@@ -29,6 +29,7 @@ export function findings(detail, all, series) {
     ...timings(series),
     ...missingReferences(detail),
     ...ownReferences(cells),
+    ...replays(cells),
     ...roundings(cells),
     ...(detail.replicates === 1
       ? [/** @type {Finding} */ ({ kind: "note", text: "one replicate a cell: how sure the errors are is not known; two or more would tell" })]
@@ -48,7 +49,7 @@ function failures(cells) {
   return [{ kind: "bad", text, filter: "failed", ...(failed.length === 1 && failed[0] ? { cell: failed[0].position } : {}) }];
 }
 
-/** Curves whose brightness chance does not explain. @param {readonly Cell[]} cells @param {readonly Cell[]} references @returns {Finding[]} */
+/** Curves whose brightness chance does not explain; replays are left out, which are wrong on purpose. @param {readonly Cell[]} cells @param {readonly Cell[]} references @returns {Finding[]} */
 function biases(cells, references) {
   const curves = brightnesses(cells, references);
   const suspects = curves.filter(({ off, chance }) => off > LEAST && chance * curves.length < CHANCE);
@@ -65,7 +66,7 @@ function biases(cells, references) {
 function brightnesses(cells, references) {
   const measured = cells.flatMap((cell) => {
     const ratio = estimateOf(cell, "mean_ratio");
-    return ratio?.se && ratio.n > 1 ? [{ cell, ratio, se: ratio.se }] : [];
+    return ratio?.se && ratio.n > 1 && !cell.replay ? [{ cell, ratio, se: ratio.se }] : [];
   });
   const noise = referenceNoise(measured, references);
   /** @type {Map<string, Brightness & {points: number, logs: number}>} */
@@ -150,6 +151,14 @@ function ownReferences(cells) {
     told.add(`${groups.join(" and ")} count different paths: each has a reference of its own, and their errors are not compared`);
   }
   return [...told].map((text) => ({ kind: "note", text }));
+}
+
+/** Samplers that are wrong on purpose. @param {readonly Cell[]} cells @returns {Finding[]} */
+function replays(cells) {
+  const named = [...new Set(cells.filter(({ replay }) => replay).map(({ sampler }) => sampler))];
+  if (!named.length) return [];
+  const shows = named.length === 1 ? "is a replay: it shows" : "are replays: they show";
+  return [{ kind: "note", text: `${list(named)} ${shows} a published mistake on purpose, plotted at the samples that were asked, and never best` }];
 }
 
 /** @param {readonly Cell[]} cells @returns {Finding[]} */

@@ -13,6 +13,7 @@ import { valueOn } from "./axes.js";
 import { rankedAlong, ranks, ratioTo } from "./compare.js";
 import { referencesOf } from "./references.js";
 import { ReferenceTile } from "./reference.js";
+import { Replay } from "./replay.js";
 import { sourceOf } from "./sources.js";
 import { Tile } from "./tile.js";
 import { placeAt } from "./view.js";
@@ -47,6 +48,7 @@ export function ImageGrid({ model, view, max, onSelect, onOpen, onLog }) {
   const { rows, cols } = view;
   const narrow = port.width > 0 && port.width < NARROW;
   const index = model.index;
+  const replays = model.detail?.replays ?? [];
   const references = useMemo(() => referencesOf(index, view), [index, view, model.complete, model.cells.length]);
   const rank = useRanks(model, view);
   const { dark } = useTheme();
@@ -82,7 +84,7 @@ export function ImageGrid({ model, view, max, onSelect, onOpen, onLog }) {
   function line(row, r) {
     const cells = shownCols.map((col) => index?.at(placeAt(view, row, col)));
     return html`<div class="grid-row" role="row" aria-rowindex=${r + 2} key=${row} style=${{ top: `${top + r * shape.height}px`, height: `${shape.height}px` }}>
-      <div class="grid-label" role="rowheader" title=${`${rows.title}: ${row}`}><${Label} axis=${rows.name} value=${row} view=${view} dark=${dark} /></div>
+      <div class="grid-label" role="rowheader" title=${`${rows.title}: ${row}`}><${Label} axis=${rows.name} value=${row} view=${view} dark=${dark} replays=${replays} /></div>
       ${beside && html`<div class="grid-reference" role="gridcell">${references.side === "row" && reference(row, undefined)}</div>`}
       <div class="grid-cells" role="presentation" style=${{ paddingLeft: `${firstCol * shape.width}px` }}>
         ${cells.map((cell, c) => {
@@ -134,7 +136,7 @@ export function ImageGrid({ model, view, max, onSelect, onOpen, onLog }) {
         ${beside && html`<div class="grid-reference" role="columnheader">reference</div>`}
         <div class="grid-cells" role="presentation" style=${{ paddingLeft: `${firstCol * shape.width}px` }}>
           ${shownCols.map((col, c) => html`<div class="grid-column" role="columnheader" aria-colindex=${firstCol + c + 2} key=${col} title=${`${cols.title}: ${col}`}>
-            <${Label} axis=${cols.name} value=${col} view=${view} dark=${dark} />
+            <${Label} axis=${cols.name} value=${col} view=${view} dark=${dark} replays=${replays} />
           </div>`)}
         </div>
       </div>
@@ -159,13 +161,18 @@ function Absent({ column, loading }) {
   </div>`;
 }
 
-/** A value of an axis; samplers have the colour of their curves. @param {{axis: string, value: string, view: View, dark: boolean}} props */
-function Label({ axis, value, view, dark }) {
+/** A value of an axis; samplers have the colour of their curves. @param {{axis: string, value: string, view: View, dark: boolean, replays: readonly string[]}} props */
+function Label({ axis, value, view, dark, replays }) {
   if (axis === "spp") return html`<span>${value} spp</span>`;
   if (axis !== "sampler") return html`<span>${value}</span>`;
   const samplers = view.axes.find(({ name }) => name === axis)?.values ?? [];
   const { colour } = styleOf({ sampler: value, integrator: "" }, { samplers, dark });
-  return html`<span><i class="dot" style=${{ background: colour }}></i>${value}</span>`;
+  return html`<span><i class="dot" style=${{ background: colour }}></i>${replays.includes(value) && html`<${Replay} /> `}${breakable(value)}</span>`;
+}
+
+/** A label that may break where its parts meet. @param {string} value */
+function breakable(value) {
+  return value.split(/(?<=[:,=])/).flatMap((part) => [part, html`<wbr />`]);
 }
 
 /** @typedef {{width: number, narrow: boolean, beside: boolean, above: boolean}} Room width in px; where references stand */

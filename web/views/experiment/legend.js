@@ -6,6 +6,7 @@
 import { html } from "../../vendor/preact-htm.js";
 import { slopeText } from "../../plots/convergence.js";
 import { styleOf } from "../../plots/plan.js";
+import { Replay } from "./replay.js";
 import { isolating, toggling } from "./view.js";
 
 /** @typedef {import("../../api.js").Series} Series */
@@ -31,6 +32,7 @@ const MARKERS = /** @type {Record<string, string>} */ ({
 export function Legend({ series, sloped, view, options, set, onEmphasis }) {
   const integrators = view.axes.find(({ name }) => name === "integrator")?.values ?? [];
   const samplers = view.axes.find(({ name }) => name === "sampler")?.values ?? [];
+  const replays = new Set(series.filter((one) => one.replay).map((one) => one.sampler));
   const of = new Map(series.map((one) => [`${one.sampler}\n${one.integrator}`, one]));
   /** @param {"sampler" | "integrator"} axis @param {string} value */
   const toggle = (axis, value) => {
@@ -46,9 +48,9 @@ export function Legend({ series, sloped, view, options, set, onEmphasis }) {
       onMouseLeave=${() => onEmphasis(null)}
     >
       ${axis === "sampler"
-        ? html`<${Swatch} colour=${style.colour} />`
+        ? html`<${Swatch} colour=${style.colour} broken=${replays.has(value)} />`
         : html`<${Swatch} colour="currentColor" dash=${style.dash} symbol=${style.symbol} />`}
-      <span class="name">${value}</span>
+      <span class="name">${value}</span>${axis === "sampler" && replays.has(value) && html`<${Replay} />`}
     </button>`;
   };
   return html`<div class="legend-scroller">
@@ -83,11 +85,14 @@ export function Legend({ series, sloped, view, options, set, onEmphasis }) {
   </div>`;
 }
 
-/** A piece of line with its marker; without a marker, only the colour. @param {{colour: string, dash?: string, symbol?: string}} props */
-function Swatch({ colour, dash, symbol }) {
+/**
+ * A piece of line with its marker; without a marker, only the colour, in two pieces where the curve is finely dashed.
+ * @param {{colour: string, dash?: string, symbol?: string, broken?: boolean}} props
+ */
+function Swatch({ colour, dash, symbol, broken }) {
   if (!symbol) {
     return html`<svg width="16" height="12" viewBox="0 0 16 12" aria-hidden="true">
-      <rect x="0" y="3.5" width="16" height="5" rx="2.5" fill=${colour} />
+      <path d="M2.5 6h11" stroke=${colour} stroke-width="5" stroke-linecap=${broken ? "butt" : "round"} stroke-dasharray=${broken ? "4.5 2" : null} />
     </svg>`;
   }
   return html`<svg width="28" height="12" viewBox="0 0 28 12" aria-hidden="true">

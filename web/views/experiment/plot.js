@@ -63,7 +63,7 @@ export function Plot({ view, curves, selected, near, onElement, set, onPoint }) 
       <${Segmented}
         label="against"
         choices=${[
-          { value: "spp", label: "samples", title: "error against samples per pixel, as rendered" },
+          { value: "spp", label: "samples", title: "error against samples per pixel, as rendered; of replays as asked" },
           { value: "seconds", label: "seconds", title: "error against the mean render time of a picture" },
         ]}
         value=${view.against}
@@ -188,6 +188,9 @@ function notesOn(convergence, shown, view, options) {
   }
   if (view.against === "seconds" && shown.some((series) => !series.alike)) {
     notes.push("Grey curves: their pictures were timed under different conditions (machine, threads or neighbours), so their seconds cannot be compared.");
+  }
+  if (shown.some((series) => series.replay)) {
+    notes.push("Finely dashed: replays. Each shows a published mistake on purpose, at the samples that were asked, as its authors plotted it.");
   }
   const lost = unplottable(convergence, options);
   if (convergence.metric.lower_is_better !== null && shown.some((series) => series.points.some((point) => isNoise(series, point)))) {

@@ -8,6 +8,7 @@ import { count, counted } from "../../format.js";
 import { Icon } from "../../parts/icons.js";
 import { toast, told } from "../../parts/toast.js";
 import { asText, columnsOf, matching, nextSort, ordered } from "./columns.js";
+import { Replay } from "./replay.js";
 import { hiddenText, showing } from "./view.js";
 import { usePort, windowOf } from "./window.js";
 
@@ -139,7 +140,7 @@ function Line({ cell, columns, index, selected, onSelect, onOpen, onLog }) {
           <span class="state" data-state=${cell.state}>${cell.error_class?.replaceAll("_", " ") ?? cell.state}</span>
         </td>`;
       }
-      return html`<td key=${column.name} class=${column.numeric ? "numeric" : ""} title=${column.numeric ? null : text}>${text}</td>`;
+      return html`<td key=${column.name} class=${column.numeric ? "numeric" : ""} title=${column.numeric ? null : text}>${column.name === "sampler" && cell.replay && html`<${Replay} /> `}${text}</td>`;
     })}
     <td class="table-actions">
       <button class="link" disabled=${cell.had === 0} onClick=${() => onOpen(cell)} aria-label=${`Picture of row ${index - 1}`}>view</button>

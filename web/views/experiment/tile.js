@@ -83,7 +83,7 @@ function Caption(props) {
     <p class="tile-notes">
       ${ratio !== null && html`<span class="number" title=${`error relative to ${baseline}, at the samples that each rendered`}>${ratio === 1 ? "baseline" : `× ${ratio.toPrecision(3)}`}</span>`}
       ${cell.spp !== cell.spp_actual &&
-      html`<span class="number tile-rounded" title=${`${cell.spp} spp were asked; ${cell.sampler} rounds them`}>${cell.spp_actual} spp</span>`}
+      html`<span class="number tile-rounded" title=${`${cell.spp} spp were asked; ${cell.sampler} ${cell.replay ? "ignores that" : "rounds them"}`}>${cell.spp_actual} spp</span>`}
       <${State} ...${props} />
       ${rank && html`<span class="tile-rank" title=${rankText(rank, along)}>${rank === "best" ? "best" : "≈ best"}</span>`}
     </p>

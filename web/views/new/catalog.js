@@ -7,11 +7,16 @@ import { getJson, scenes } from "../../api.js";
  * @typedef {object} Parameter
  * @property {string} name
  * @property {"bool" | "int" | "float" | "str"} type
- * @property {boolean | number | string | null} default null: taken from the grid or the scene
+ * @property {boolean | number | string | null} default null: not set
+ * @property {string} unset what null comes to
  * @property {string} unit
  * @property {number | null} minimum
  * @property {number | null} maximum
  * @property {string} line
+ * @property {readonly string[]} options of a text; empty: any text
+ * @property {readonly string[]} meanings of the options
+ * @property {readonly string[]} replays those of the options that show a published mistake
+ * @property {boolean} required
  */
 /**
  * @typedef {object} Entry
@@ -21,6 +26,7 @@ import { getJson, scenes } from "../../api.js";
  * @property {readonly string[]} aliases
  * @property {readonly Parameter[]} parameters
  * @property {string} [rounding] samplers only
+ * @property {number | null} [limit] samplers only: the most samples per pixel
  */
 /**
  * @typedef {object} SceneEntry
@@ -49,6 +55,16 @@ export async function readCatalog() {
 /** The entry that a name or an alias means. @param {readonly Entry[]} entries @param {string} type */
 export function entryOf(entries, type) {
   return entries.find(({ name, aliases }) => name === type || aliases.includes(type));
+}
+
+/** The parameter by which a sampler becomes a replay, where it is none without it. @param {Entry | undefined} entry */
+export function replayOf(entry) {
+  return entry?.parameters.find(({ replays, default: usual }) => replays.length > 0 && usual === "");
+}
+
+/** Whether a choice shows a published mistake. @param {Entry | undefined} entry @param {import("./form.js").Choice} choice */
+export function isReplay(entry, { parameters }) {
+  return entry?.parameters.some(({ name, replays }) => replays.includes(parameters[name] ?? "")) ?? false;
 }
 
 /** The range of a parameter in words. @param {Parameter} parameter */

@@ -9,6 +9,7 @@
 /** @typedef {import("../../api.js").Submission} Submission */
 /** One value of an axis; parameters as they were typed, those that are the default left out. */
 /** @typedef {{type: string, parameters: Readonly<Record<string, string>>}} Choice */
+/** A file that was sent to the server. @typedef {{name: string, digest: string}} Upload */
 /** A scene; `digest` says which upload is meant, built-in scenes have none. */
 /** @typedef {{name: string, digest?: string}} SceneChoice */
 /** What pictures are measured against; "" is the server's default. */
@@ -18,6 +19,7 @@
  * @property {string} name
  * @property {readonly SceneChoice[]} scenes
  * @property {readonly Choice[]} samplers
+ * @property {readonly Upload[]} points point files that samplers name
  * @property {readonly Choice[]} integrators
  * @property {readonly string[]} spp
  * @property {string} replicates
@@ -34,6 +36,7 @@ export const START = {
   name: "",
   scenes: [{ name: "cornell_box" }],
   samplers: ["independent", "stratified", "multijitter"].map(choice),
+  points: [],
   integrators: [choice("path")],
   spp: ["4", "16", "64"],
   replicates: "4",
@@ -81,6 +84,7 @@ function fields(form) {
     name: [form.name],
     scene: form.scenes.map(sceneText),
     sampler: form.samplers.map(label),
+    points: form.points.map(sceneText),
     integrator: form.integrators.map(label),
     spp: [form.spp.join(",")],
     replicates: [form.replicates],
@@ -120,6 +124,7 @@ export function fromQuery(params) {
     name: one("name"),
     scenes: all("scene").map(scene),
     samplers: all("sampler").map(choice),
+    points: all("points").map(scene).flatMap(({ name, digest }) => (digest ? [{ name, digest }] : [])),
     integrators: all("integrator").map(choice),
     spp: one("spp").split(",").filter(Boolean),
     replicates: one("replicates"),
@@ -162,12 +167,12 @@ export function toSubmission(form) {
       ? Object.fromEntries(asked.map(([key, text]) => [key, key === "spp" ? value(String(text)) : text]))
       : false,
   };
-  return { grid, origin: "the form", scenes: uploads(form.scenes) };
+  return { grid, origin: "the form", scenes: uploads(form.scenes), points: uploads(form.points) };
 }
 
-/** @param {readonly SceneChoice[]} scenes @returns {Record<string, string>} */
-function uploads(scenes) {
-  return Object.fromEntries(scenes.flatMap(({ name, digest }) => (digest ? [[name, digest]] : [])));
+/** @param {readonly SceneChoice[]} files @returns {Record<string, string>} */
+export function uploads(files) {
+  return Object.fromEntries(files.flatMap(({ name, digest }) => (digest ? [[name, digest]] : [])));
 }
 
 const MAX_NAME = 120; // characters that a list still shows whole

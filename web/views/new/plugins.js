@@ -5,20 +5,29 @@
  */
 import { html } from "../../vendor/preact-htm.js";
 import { Icon } from "../../parts/icons.js";
-import { allowed, entryOf } from "./catalog.js";
+import { allowed, entryOf, isReplay, replayOf } from "./catalog.js";
 import { onText } from "./fields.js";
 import { label } from "./form.js";
+import { PointFileField } from "./pointfile.js";
 
 /** @typedef {import("./catalog.js").Entry} Entry */
 /** @typedef {import("./catalog.js").Parameter} Parameter */
 /** @typedef {import("./form.js").Choice} Choice */
-/** @typedef {(chosen: readonly Choice[]) => void} OnChange */
+/** @typedef {import("./form.js").Upload} Upload */
+/** `points`: where a file was sent just now, all of them. @typedef {(chosen: readonly Choice[], points?: readonly Upload[]) => void} OnChange */
+/** @typedef {(next: Choice, points?: readonly Upload[]) => void} OnChoice */
 
-/** @param {{entries: readonly Entry[], chosen: readonly Choice[], onChange: OnChange}} props */
-export function Plugins({ entries, chosen, onChange }) {
+/** Replays are chosen elsewhere (`replays.js`). @param {{entries: readonly Entry[], chosen: readonly Choice[], onChange: OnChange, points?: readonly Upload[]}} props */
+export function Plugins({ entries, chosen, onChange, points = [] }) {
   const unknown = chosen.filter(({ type }) => !entryOf(entries, type));
+  const sources = [...new Set(entries.map(({ source }) => source))];
   return html`<ul class="plugins">
-    ${entries.map((entry) => html`<${Plugin} key=${entry.name} ...${{ entry, entries, chosen, onChange }} />`)}
+    ${sources.map((source) => [
+      sources.length > 1 && html`<li class="plugins-source" key=${source}>${source}</li>`,
+      ...entries
+        .filter((entry) => entry.source === source)
+        .map((entry) => html`<${Plugin} key=${entry.name} ...${{ entry, entries, chosen, onChange, points }} />`),
+    ])}
     ${unknown.map(
       (one) => html`<li class="plugin" key=${label(one)}>
         <label class="plugin-head">
@@ -30,9 +39,11 @@ export function Plugins({ entries, chosen, onChange }) {
   </ul>`;
 }
 
-/** @param {{entry: Entry, entries: readonly Entry[], chosen: readonly Choice[], onChange: OnChange}} props */
-function Plugin({ entry, entries, chosen, onChange }) {
-  const variants = chosen.filter(({ type }) => entryOf(entries, type) === entry);
+/** @param {{entry: Entry, entries: readonly Entry[], chosen: readonly Choice[], onChange: OnChange, points: readonly Upload[]}} props */
+function Plugin({ entry, entries, chosen, onChange, points }) {
+  const folded = replayOf(entry);
+  const own = chosen.filter(({ type }) => entryOf(entries, type) === entry);
+  const variants = folded ? own.filter((one) => !isReplay(entry, one)) : own;
   const rest = chosen.filter((one) => !variants.includes(one));
   const toggle = () => onChange(variants.length ? rest : inserted(entries, rest, { type: entry.name, parameters: {} }));
   const another = () => {
@@ -45,6 +56,7 @@ function Plugin({ entry, entries, chosen, onChange }) {
       <strong>${entry.name}</strong>
       <span class="hint">${entry.line}</span>
       ${entry.rounding && entry.rounding !== "every spp" && html`<span class="tag">rounds ${entry.rounding}</span>`}
+      ${entry.limit && html`<span class="tag">at most ${entry.limit} spp</span>`}
     </label>
     ${variants.length > 0 &&
     entry.parameters.length > 0 &&
@@ -55,7 +67,8 @@ function Plugin({ entry, entries, chosen, onChange }) {
           entry=${entry}
           variant=${variant}
           first=${index === 0}
-          onChange=${(/** @type {Choice} */ next) => onChange(chosen.map((one) => (one === variant ? next : one)))}
+          points=${points}
+          onChange=${/** @type {OnChoice} */ ((next, sent) => onChange(chosen.map((one) => (one === variant ? next : one)), sent))}
           onRemove=${variants.length > 1 ? () => onChange(chosen.filter((one) => one !== variant)) : undefined}
         />`,
       )}
@@ -89,12 +102,12 @@ function varied(entry, one) {
 }
 
 /**
- * @param {{entry: Entry, variant: Choice, first: boolean, onChange: (next: Choice) => void,
+ * @param {{entry: Entry, variant: Choice, first: boolean, onChange: OnChoice, points: readonly Upload[],
  *   onRemove?: () => void}} props
  */
-function Variant({ entry, variant, first, onChange, onRemove }) {
+function Variant({ entry, variant, first, onChange, onRemove, points }) {
   return html`<div class="variant" role="group" aria-label=${label(variant)}>
-    <${Parameters} entry=${entry} choice=${variant} onChange=${onChange} explained=${first} />
+    <${Parameters} ...${{ entry, choice: variant, onChange, explained: first, points }} />
     ${onRemove &&
     html`<button
       class="button quiet icon variant-remove"
@@ -110,20 +123,29 @@ function Variant({ entry, variant, first, onChange, onRemove }) {
 
 /**
  * The parameters of a choice as fields; an empty one is the default.
- * @param {{entry: Entry, choice: Choice, onChange: (next: Choice) => void, explained?: boolean}} props
+ * @param {{entry: Entry, choice: Choice, onChange: OnChoice, explained?: boolean, points?: readonly Upload[]}} props
  */
-export function Parameters({ entry, choice, onChange, explained = true }) {
-  /** @type {(name: string, text: string) => void} */
-  const set = (name, text) => {
+export function Parameters({ entry, choice, onChange, explained = true, points = [] }) {
+  /** @type {(name: string, text: string, sent?: readonly Upload[]) => void} */
+  const set = (name, text, sent) => {
     const { [name]: _, ...others } = choice.parameters;
     const usual = entry.parameters.find((parameter) => parameter.name === name)?.default;
-    onChange({ ...choice, parameters: text === "" || text === String(usual) ? others : { ...others, [name]: text } });
+    onChange({ ...choice, parameters: text === "" || text === String(usual) ? others : { ...others, [name]: text } }, sent);
   };
   return html`<div class="parameters">
     ${entry.parameters.map((parameter) => {
-      const { name, type, line } = parameter;
+      const { name, type, line, options, replays } = parameter;
+      if (parameter === replayOf(entry)) return null;
       const text = choice.parameters[name] ?? "";
-      const usual = parameter.default === null ? "as the scene" : String(parameter.default);
+      if (parameter.required) {
+        /** @param {Upload} file */
+        const sent = ({ name: called, digest }) =>
+          set(name, called, [...points.filter((one) => one.name !== called), { name: called, digest }]);
+        return html`<div class="parameter" key=${name}>
+          <${PointFileField} value=${text} points=${points} onSent=${sent} />
+        </div>`;
+      }
+      const usual = parameter.default === null ? parameter.unset : String(parameter.default);
       const about = [line, allowed(parameter)].filter(Boolean).join("; ");
       return html`<label class="parameter" key=${name} title=${about}>
         <span class="parameter-line">
@@ -134,7 +156,16 @@ export function Parameters({ entry, choice, onChange, explained = true }) {
             onChange=${() => set(name, String((text || usual) !== "true"))}
           />`}
           <code>${name}</code>
+          ${options.length > 0 &&
+          html`<select value=${text || usual} onChange=${onText((picked) => set(name, picked))}>
+            ${options.map(
+              (option, at) => html`<option key=${option} value=${option} selected=${option === (text || usual)} title=${parameter.meanings[at]}>
+                ${option}${replays.includes(option) && " (replay)"}
+              </option>`,
+            )}
+          </select>`}
           ${type !== "bool" &&
+          options.length === 0 &&
           html`<input
             type="text"
             inputmode=${type === "str" ? "text" : "decimal"}

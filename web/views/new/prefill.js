@@ -15,7 +15,7 @@ const COPY = / \(copy(?: (\d+))?\)$/;
  * The form of an experiment's grid, null where the form cannot say all of it.
  * @param {ExperimentDetail} experiment @returns {Form | null}
  */
-export function formOf({ toml, paths = {} }) {
+export function formOf({ toml, paths = {}, points = {} }) {
   const grid = readToml(toml);
   if (!grid || Object.keys(grid).some((key) => !FIELDS.includes(key))) return null;
   const reference = grid.reference;
@@ -27,6 +27,7 @@ export function formOf({ toml, paths = {} }) {
     name: copied(String(grid.name ?? "")),
     scenes: texts(grid.scenes).map((name) => (paths[name] ? { name, digest: paths[name] } : { name })),
     samplers: texts(grid.samplers).map(choice),
+    points: Object.entries(points).map(([name, digest]) => ({ name, digest })),
     integrators: texts(grid.integrators).map(choice),
     spp: texts(grid.spp),
     replicates: String(grid.replicates ?? ""),

@@ -178,7 +178,7 @@ export function ReferenceFields({ reference, onChange, catalog }) {
         hint="in total, in two independent halves"
         onInput=${set("spp")}
       />
-      <${SelectField} label="Sampler" value=${sampler} options=${names(catalog.samplers)} onChange=${set("sampler")} />
+      <${SelectField} label="Sampler" value=${sampler} options=${names(catalog.samplers.filter(complete))} onChange=${set("sampler")} />
       <${SelectField}
         label="Integrator"
         value=${integrator}
@@ -186,6 +186,11 @@ export function ReferenceFields({ reference, onChange, catalog }) {
         onChange=${set("integrator")}
       />
     </div>`}`;
+}
+
+/** Whether a plugin can be named alone. @param {import("./catalog.js").Entry} entry */
+function complete({ parameters }) {
+  return !parameters.some(({ required }) => required);
 }
 
 /** @param {readonly {name: string}[]} entries */
