@@ -173,6 +173,26 @@ def measure(
 
 
 @app.command()
+def points(
+    sampler: Annotated[str, typer.Argument(metavar="SAMPLER", help="NAME or NAME:key=value,…")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FILE.npz", help="The file to write.")],
+    spp: Annotated[int, typer.Option(help="Samples per pixel: points of a set.")],
+    sets: Annotated[int, typer.Option(min=1, help="Pixels whose points are drawn.")] = 64,
+    seed: Annotated[int, typer.Option(min=0, max=2**32 - 1, help="Another number, other points.")] = 0,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE.png", help="Draw points, spectrum and distances as well.")
+    ] = None,
+    device: Device = "auto",
+    as_json: Json = False,
+) -> None:
+    """Write the points of a sampler, as a render draws them, and say how even they are."""
+    from service.pointing import points_of, show
+
+    told = points_of(sampler, output, spp=spp, sets=sets, seed=seed, plot=plot, device=device)
+    _print_json(told) if as_json else show(told)
+
+
+@app.command()
 def results(
     experiment: ExperimentName,
     form: Annotated[str, typer.Option("--format", help="csv, json or table.")] = "table",
