@@ -22,8 +22,8 @@ class Sobol(PixelSampler):
     When it wins: nearly always, if spp is a power of two. For smooth integrands of two dimensions its squared error
     falls as N^-3, with edges as N^-1.5. It is the default to beat.
 
-    When it loses: at other spp. The Gaussian of the tables below has 20 times the error at 200 samples that it has at 256. Structure
-    of more than two dimensions is left to chance, as with every padded sampler: N^-1 in the end.
+    When it loses: at other spp. The Gaussian of the tables below has 20 times the error at 200 samples that it has at
+    256. Structure of more than two dimensions is left to chance, as with every padded sampler: N^-1 in the end.
 
     Source: Sobol' 1967; Owen 1995; shuffle and hashed scrambling by Burley 2020, "Practical Hash-based Owen Scrambling"
     (JCGT 9:4), with the hash of Laine and Karras 2011.
