@@ -20,22 +20,27 @@ A grid has these keys; all but ``scenes`` may be left out. Where a list is expec
     colour       "rgb" or "spectral" (default: rgb)
     reference    what to measure against: { integrator, sampler, spp, replicates }, or false for no reference
                  (default: path, independent, 4096 spp in total, 2 replicates)
+    sweep        tables [[sweep]]: parameter of a scene ("sphere.bsdf.nu"), values (numbers, or colours [r, g, b]), and
+                 scenes, where it does not apply to all; several multiply
     scene        tables [scene.NAME]: resolution, crop, max_depth, reference where one scene differs
 """
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from jobs import gridsweeps
 from jobs.errors import GridError
 from jobs.fields import Problems, Table, choice
 from jobs.gridpoints import PointFinder, bind, check_count, file_of, nowhere, points_of
 from jobs.gridscenes import Finder, scenes_of
-from jobs.gridspec import MAX_CELLS, MAX_REPLICATES, GridSpec, ReferenceRequest, SceneRequest
+from jobs.gridspec import MAX_CELLS, MAX_REPLICATES, GridSpec, ReferenceRequest, SceneRequest, Sweep
+from jobs.gridsweeps import Lister, nobody
 from renderer import catalog
 from renderer.errors import UnknownName, shown
 from renderer.samplers import pointfile
@@ -43,20 +48,20 @@ from renderer.samplers.pointfile import PointSource
 from renderer.scenes import sources
 from renderer.spec import Choice
 
-__all__ = ["GridSpec", "ReferenceRequest", "SceneRequest", "parse", "read"]
+__all__ = ["GridSpec", "ReferenceRequest", "SceneRequest", "Sweep", "parse", "read"]
 
 MAX_NAME = 200  # characters
 MAX_BYTES = 2**24  # of a grid file
 
 GRID_KEYS = (
     "name", "scenes", "samplers", "integrators", "spp", "replicates", "resolution", "crop", "max_depth", "rfilter",
-    "colour", "reference", "scene",
+    "colour", "reference", "sweep", "scene",
 )  # fmt: skip
 EXAMPLE = "examples/first.toml shows a whole grid"
 
 
-def read(path: Path) -> GridSpec:
-    """The grid in a TOML file. Raises ``GridError`` with every problem found."""
+def read(path: Path, lister: Lister = nobody) -> GridSpec:
+    """The grid in a TOML file; ``lister`` as for ``parse``. Raises ``GridError`` with every problem found."""
     try:
         if path.is_dir():
             raise GridError([f"{path} is a folder; give the grid file itself, such as {path / 'grid.toml'}"])
@@ -77,7 +82,7 @@ def read(path: Path) -> GridSpec:
     data = loads(text, str(path))
     return parse(
         data, find=partial(sources.find, base=path.parent), points=partial(pointfile.find, base=path.parent),
-        origin=path.name,
+        origin=path.name, lister=lister,
     )  # fmt: skip
 
 
@@ -95,17 +100,17 @@ def loads(text: str, origin: str) -> dict[str, Any]:
         raise GridError([f"{origin} is not TOML{where}: {reason}; correct it there; {EXAMPLE}"]) from None
 
 
-def parse(data: Mapping[str, Any], *, find: Finder, origin: str, points: PointFinder = nowhere) -> GridSpec:
+def parse(
+    data: Mapping[str, Any], *, find: Finder, origin: str, points: PointFinder = nowhere, lister: Lister = nobody
+) -> GridSpec:
     """
     The grid in parsed TOML or JSON. ``find`` gives the scene of a name and ``points`` the point file, ``origin`` is
-    what sentences call the request ("grid.toml"). Raises ``GridError`` with every problem found.
+    what sentences call the request ("grid.toml"). ``lister`` knows what can be swept in a scene and is asked only
+    where something is. Raises ``GridError`` with every problem found.
     """
     problems = Problems()
     if not isinstance(data, Mapping):
         raise GridError([f"{origin} is {shown(data)}; a grid is a table with at least scenes; {EXAMPLE}"])
-    if "sweep" in data:
-        problems.add(f"sweep of {origin}: material sweeps come in a later version; write one scene file per material")
-        data = {key: value for key, value in data.items() if key != "sweep"}
     grid = Table(data, origin, GRID_KEYS, problems)
     samplers = _choices(grid, "samplers", "sampler", "independent")
     integrators = _choices(grid, "integrators", "integrator", "path")
@@ -114,13 +119,15 @@ def parse(data: Mapping[str, Any], *, find: Finder, origin: str, points: PointFi
     spp = _spp(grid, samplers, files)
     name, colour, replicates = _name(grid), _colour(grid), grid.integer("replicates", 1, MAX_REPLICATES)
     names = _scene_names(grid)
-    _check_count(grid, {"scenes": names, "integrators": integrators, "samplers": samplers, "spp": spp})
+    sweeps = gridsweeps.sweeps_of(grid, list(names))
+    _check_count(grid, names, sweeps, {"integrators": integrators, "samplers": samplers, "spp": spp})
     scenes = scenes_of(grid, names, integrators, find)
+    gridsweeps.check(grid, sweeps, scenes, colour or "rgb", lister)
     problems.raise_any()
     assert name and rfilter and colour, "what could not be read is a problem"
     return GridSpec(
         name, tuple(scenes), tuple(bind(samplers, files)), tuple(integrators), tuple(spp), replicates or 4, rfilter,
-        colour, tuple({source.digest: source for source in files.values()}.values()),
+        colour, tuple({source.digest: source for source in files.values()}.values()), tuple(sweeps),
     )  # fmt: skip
 
 
@@ -181,13 +188,16 @@ def _colour(grid: Table) -> str | None:
     return None
 
 
-def _check_count(grid: Table, axes: Mapping[str, Sequence[object] | Mapping[str, str]]) -> None:
+def _check_count(
+    grid: Table, scenes: Iterable[str], sweeps: Sequence[Sweep], axes: Mapping[str, Sequence[object]]
+) -> None:
     """Refuses a grid that is too large before any scene is read or cell made."""
-    cells = 1
-    for values in axes.values():
-        cells *= len(values)
+    names = list(scenes)
+    in_scenes = sum(gridsweeps.count(sweeps, name) for name in names)
+    cells = in_scenes * math.prod(len(values) for values in axes.values())
     if cells > MAX_CELLS:
-        product = " × ".join(f"{len(values)} {axis}" for axis, values in axes.items())
+        first = f"{in_scenes} sweep values in {len(names)} scenes" if sweeps else f"{len(names)} scenes"
+        product = " × ".join([first, *(f"{len(values)} {axis}" for axis, values in axes.items())])
         grid.problems.add(
             f"{grid.where} asks for {cells} cells ({product}), more than {MAX_CELLS}; leave out values, or split "
             "it into several grids: what they share is rendered once"

@@ -78,7 +78,7 @@ def _own_settings(grid: Table, names: Iterable[str]) -> dict[str, _Settings]:
     found: dict[str, _Settings] = {}
     for key, value in grid.table("scene", "write tables [scene.NAME]").items():
         where = f"[scene.{key}] of {grid.where}"
-        matches = [key] if key in names else [name for name in names if Path(name).stem == key]
+        matches = named(key, names)
         if not isinstance(value, Mapping):
             grid.wrong(where, value, f"write a table with some of {', '.join(SCENE_KEYS)}")
             continue
@@ -92,6 +92,12 @@ def _own_settings(grid: Table, names: Iterable[str]) -> dict[str, _Settings]:
         else:
             found[matches[0]] = own
     return found
+
+
+def named(key: str, names: Iterable[str]) -> list[str]:
+    """The scenes that a table means: one by its full name, or all of that name without folders and extension."""
+    known = list(names)
+    return [key] if key in known else [name for name in known if Path(name).stem == key]
 
 
 def _scene(name: str, place: str, find: Finder, own: _Settings | None, common: _Settings) -> SceneRequest | None:

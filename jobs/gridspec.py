@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Any
 
 from renderer import catalog
+from renderer.parameters import Value
 from renderer.samplers.pointfile import PointSource
 from renderer.scenes.sources import SceneSource
 from renderer.spec import FORMAT, PASS_LOOP, PRECISION, SCENE_LOADER, Choice, canonical, digest_of
@@ -88,6 +89,24 @@ class SceneRequest:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """
+    An axis that is set in the loaded scene.
+
+    parameter  as it was written; what it means in a scene is the business of ``renderer.parameters``
+    values     numbers, or colours (linear RGB); none twice
+    scenes     names of the scenes that it applies to
+    """
+
+    parameter: str
+    values: tuple[Value, ...]
+    scenes: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        return {"parameter": self.parameter, "values": self.values, "scenes": self.scenes}
+
+
+@dataclass(frozen=True)
 class GridSpec:
     """
     A grid that was read and checked. ``samplers``, ``integrators`` and ``spp`` hold no value twice; spp ascends.
@@ -104,12 +123,27 @@ class GridSpec:
     rfilter: Choice
     colour: str
     points: tuple[PointSource, ...] = ()
+    sweeps: tuple[Sweep, ...] = ()
+
+    @property
+    def axes(self) -> dict[str, int]:
+        """How many values each axis has; a sweep by the name of its parameter, over all scenes."""
+        sweeps: dict[str, set[Value]] = {}
+        for sweep in self.sweeps:
+            sweeps.setdefault(sweep.parameter, set()).update(sweep.values)
+        return {
+            "scenes": len(self.scenes), "samplers": len(self.samplers), "integrators": len(self.integrators),
+            "spp": len(self.spp), "replicates": self.replicates,
+            **{parameter: len(values) for parameter, values in sweeps.items()},
+        }  # fmt: skip
 
     @cached_property
     def text(self) -> str:
         """Canonical JSON of all that decides which pictures are made, with the scenes by digest."""
+        sweeps = {"sweeps": [sweep.as_json() for sweep in self.sweeps]} if self.sweeps else {}
         return canonical(
             {
+                **sweeps,  # left out where there are none: such grids keep the digest that they had before sweeps
                 "colour": self.colour,
                 "format": FORMAT,
                 "integrators": [json.loads(choice.text) for choice in self.integrators],

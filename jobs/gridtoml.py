@@ -41,6 +41,12 @@ def toml_of(grid: Json) -> str:
             own["crop"] = f"[0, 0, {scene['width']}, {scene['height']}]"  # the whole film
         if own:
             lines += ["", f"[scene.{_text(scene['name'])}]", *(f"{key} = {value}" for key, value in own.items())]
+    everywhere = [scene["name"] for scene in scenes]
+    for sweep in grid.get("sweeps", ()):
+        values = json.dumps(sweep["values"])
+        lines += ["", "[[sweep]]", f"parameter = {_text(sweep['parameter'])}", f"values = {values}"]
+        if sweep["scenes"] != everywhere:
+            lines.append(f"scenes = {_list(iter(sweep['scenes']))}")
     return "\n".join(lines) + "\n"
 
 

@@ -1,9 +1,10 @@
 """
 The cells of a grid, in the order in which they are to be rendered.
 
-Scene by scene, because every loaded scene slows all kernels. In a scene first the lowest spp of every curve, so that
-each shows something early; then the references, so that errors can be measured; then all curves at the next spp, and
-so on: a grid that is stopped early has complete curves up to some spp.
+Scene by scene, because every loaded scene slows all kernels; all swept values of a scene inside it, because they are
+set in the loaded scene and share its kernels. In a scene first the lowest spp of every curve, so that each shows
+something early; then the references, so that errors can be measured; then all curves at the next spp, and so on: a grid
+that is stopped early has complete curves up to some spp.
 
 An integrator's parameters that change the expected picture (max_depth, hide_emitters) move into the estimand here,
 so that cells are only ever compared with a reference of the same expectation. Nothing here renders or remembers.
@@ -13,11 +14,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, product
 from typing import Literal
 
 from jobs.gridspec import GridSpec, SceneRequest, path_lengths
+from jobs.gridsweeps import points_of
 from renderer import catalog
+from renderer.parameters import Value
 from renderer.spec import CellSpec, Choice, Estimand, Scalar
 
 Role = Literal["cell", "reference"]
@@ -88,9 +91,12 @@ class _Row:
 
 
 def _rows(grid: GridSpec, scene: SceneRequest, seen: set[tuple[str, ...]]) -> Iterator[_Row]:
-    """One row for each integrator whose cells are not planned yet (two spellings may mean the same cells)."""
-    for choice in grid.integrators:
-        estimand = _estimand(grid, scene, choice)
+    """
+    One row for each combination of swept values and each integrator, if its cells are not planned yet (two spellings
+    may mean the same cells).
+    """
+    for sweep, choice in product(points_of(grid.sweeps, scene.source.name), grid.integrators):
+        estimand = _estimand(grid, scene, choice, sweep)
         integrator = _without_estimand(choice)
         key = (estimand.text, integrator.text)
         if key in seen:
@@ -126,7 +132,9 @@ def _references(scene: SceneRequest, rows: list[_Row], seen: set[tuple[str, ...]
         yield PlannedCell(spec, "reference", request.replicates, request.asked, scene.source.name, label, sampler, None)
 
 
-def _estimand(grid: GridSpec, scene: SceneRequest, integrator: Choice) -> Estimand:
+def _estimand(
+    grid: GridSpec, scene: SceneRequest, integrator: Choice, sweep: tuple[tuple[str, Value], ...]
+) -> Estimand:
     """What the pictures of this integrator converge to in this scene."""
     return Estimand(
         scene=scene.source.digest,
@@ -137,6 +145,7 @@ def _estimand(grid: GridSpec, scene: SceneRequest, integrator: Choice) -> Estima
         hide_emitters=bool(dict(integrator.parameters).get("hide_emitters", False)),
         rfilter=grid.rfilter,
         colour=grid.colour,
+        sweep=sweep,
     )
 
 

@@ -87,8 +87,9 @@ def render(
 
     ``loaded`` is the scene of ``spec.estimand``; ``on_pass`` is called after every pass but costs only what it
     does itself. ``points`` is the folder of the point sets that people brought along, by digest. Raises
-    ``BadParameter`` if the sampler does not take the spp of the spec.
+    ``BadParameter`` if the sampler does not take the spp of the spec, or the scene not what the sweep sets in it.
     """
+    loaded.settings.apply(spec.estimand.sweep)
     width, height = spec.estimand.size
     k = samples_per_pass(width * height, spec.spp)
     frame = Frame(loaded, k, spec.spp)

@@ -89,7 +89,7 @@ class Estimand:
     hide_emitters  True: lamps are not seen directly
     rfilter        reconstruction filter
     colour         "rgb" or "spectral"
-    sweep          sorted (parameter, value) pairs that this cell sets in the scene
+    sweep          sorted (parameter, value) pairs that this cell sets in the scene, colours as tuples
     """
 
     scene: str
@@ -134,7 +134,10 @@ class Estimand:
         fields = dict(data)
         fields["rfilter"] = Choice.of(fields["rfilter"])
         fields["crop"] = tuple(fields["crop"]) if fields["crop"] else None
-        fields["sweep"] = tuple(sorted(fields["sweep"].items()))
+        fields["sweep"] = tuple(
+            (name, tuple(value) if isinstance(value, list) else value)
+            for name, value in sorted(fields["sweep"].items())
+        )
         return cls(**fields)
 
 

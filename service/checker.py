@@ -11,7 +11,9 @@ from typing import Any
 
 from jobs import experiments, grid, plan
 from jobs.estimate import Estimate, estimate
+from jobs.lister import SceneLister
 from jobs.store import FILE, Store
+from renderer import devices
 from service.progress import duration
 from service.tables import size
 
@@ -19,7 +21,7 @@ from service.tables import size
 def check_grid(file: Path, data: Path, *, as_json: bool) -> None:
     """Print the dry run of the grid in ``file`` against what ``data`` has, if it is there."""
     gc.disable()  # this process ends with the answer; looking for garbage among 10⁵ cells takes a fifth of its time
-    planned = plan.expand(grid.read(file))
+    planned = plan.expand(grid.read(file, SceneLister(devices.pick)))
     rates: dict[tuple[str, str], float] = {}
     had: dict[tuple[str, plan.Role], int] = {}
     if (data / FILE).is_file():
@@ -34,12 +36,7 @@ def check_grid(file: Path, data: Path, *, as_json: bool) -> None:
 
 
 def _as_json(planned: plan.Plan, cost: Estimate) -> dict[str, Any]:
-    asked = planned.grid
-    axes = {
-        "scenes": len(asked.scenes), "samplers": len(asked.samplers), "integrators": len(asked.integrators),
-        "spp": len(asked.spp), "replicates": asked.replicates,
-    }  # fmt: skip
-    return {"name": asked.name, "axes": axes, **asdict(cost)}
+    return {"name": planned.grid.name, "axes": planned.grid.axes, **asdict(cost)}
 
 
 def _show(planned: plan.Plan, cost: Estimate, data: Path) -> None:
@@ -48,6 +45,9 @@ def _show(planned: plan.Plan, cost: Estimate, data: Path) -> None:
         f"{asked.name}: {len(asked.scenes)} scenes × {len(asked.integrators)} integrators × "
         f"{len(asked.samplers)} samplers × {len(asked.spp)} spp, {asked.replicates} replicates each"
     )
+    for sweep in asked.sweeps:
+        where = "" if len(sweep.scenes) == len(asked.scenes) else f" in {', '.join(sweep.scenes)}"
+        print(f"  sweep        {sweep.parameter}: {len(sweep.values)} values{where}")
     print(f"  cells        {cost.cells}, and {cost.references} references")
     print(f"  pictures     {cost.replicates}, of which {cost.reused} are in {data}")
     for rounded in cost.rounded:

@@ -24,9 +24,11 @@ from jobs.artifacts import Artifacts
 from jobs.dispatcher import Dispatcher, News
 from jobs.executors.base import Done, Failed, Finished, Passed, Released, Started
 from jobs.executors.local import LocalExecutor
+from jobs.lister import SceneLister
 from jobs.store import Store
 from renderer.devices import Device
 from renderer.errors import DartboardError, EnvironmentProblem
+from service.names import cell_name
 from service.readers import Readers
 from service.settings import usable_kernel_caches
 from service.standings import Standings
@@ -84,6 +86,7 @@ class Engine:
     def __init__(self, data: Path, device: Device, on_change: Callable[[], None] = lambda: None):
         self.artifacts = Artifacts(data)
         self.device, self.on_change = device, on_change
+        self.lister = SceneLister(lambda: device)  # what can be swept in a scene
         self.readers, self.standings = Readers(self.artifacts.data), Standings()
         self.moment = Moment()
         self.machine = platform.node()
@@ -280,7 +283,8 @@ class Engine:
         wanted = store.rows("experiments_of_cell", cell_id=news.work.cell_id)
         where = wanted[0] if wanted else {"scene": "", "integrator": "", "sampler": ""}
         role, replicate = news.work.missing[0]
-        description = f"{where['scene']} · {where['integrator']} · {where['sampler']} · {news.work.spec.spp} spp"
+        spec = news.work.spec
+        description = cell_name(where["scene"], where["integrator"], where["sampler"], spec.spp, spec.estimand.sweep)
         return Drawing(
             news.work.cell_id, role, replicate, description, tuple(dict.fromkeys(row["id"] for row in wanted))
         )

@@ -12,7 +12,8 @@ import time
 from collections.abc import Iterator
 
 from service.client import Away, Back, Client
-from service.progress import Bars, cell_name, replicate_name
+from service.names import cell_name, replicate_name
+from service.progress import Bars
 from service.schemas import Cell, Experiment, ExperimentDetail, Progress, Update, Worker
 
 ENDS = ("done", "failed", "cancelled")  # states that nothing leaves by itself
@@ -49,7 +50,7 @@ class Watcher:
         self.bars.count(update.experiment.had, update.experiment.seconds_left)
         self._look_at(update.worker)
         for cell in update.cells:
-            name = cell_name(cell.scene, cell.integrator, cell.sampler, cell.spp)
+            name = cell_name(cell.scene, cell.integrator, cell.sampler, cell.spp, cell.sweep)
             self.names[cell.cell] = name
             if cell.state in ("done", "failed") and (cell.cell, cell.role, cell.state) not in self.told:
                 self.told.add((cell.cell, cell.role, cell.state))

@@ -95,10 +95,10 @@ def of_http(request: Request, error: HTTPException) -> JSONResponse:
 
 def field_of(sentence: str) -> str | None:
     """The key of a grid that a sentence of ``jobs/grid.py`` is about, from the place that it names."""
-    named = re.search(r"\[(scene|reference)\b", sentence)
+    named = re.search(r"\[(scene|reference|sweep)\b", sentence)
     keyed = re.search(
-        r"\b(name|scenes|samplers|integrators|spp|replicates|resolution|crop|max_depth|rfilter|colour|reference)"
-        r"(\[\d+\])?( of |: | is | asks )",
+        r"\b(name|scenes|samplers|integrators|spp|replicates|resolution|crop|max_depth|rfilter|colour|reference"
+        r"|sweep)(\[\d+\])?( of |: | is | asks )",
         sentence,
     )
     found = named or keyed or re.search(r"in (samplers|integrators|rfilter)\b", sentence)

@@ -19,6 +19,7 @@ from rich.text import Text
 from jobs.dispatcher import News
 from jobs.executors.base import Failed, Finished, Passed
 from jobs.plan import Plan
+from service.names import cell_name, replicate_name
 
 console = Console(stderr=True, highlight=False)
 
@@ -109,7 +110,8 @@ class Follower:
 
     def hear(self, news: News) -> None:
         """One piece of news from the dispatcher."""
-        name = cell_name(*self.labels.get(news.work.digest, ("", "", "")), news.work.spec.spp)
+        spec = news.work.spec
+        name = cell_name(*self.labels.get(news.work.digest, ("", "", "")), spec.spp, spec.estimand.sweep)
         match news.event:
             case Passed(role=role, k=k, done=done, passes=passes):
                 self.bars.now(f"{name} · {replicate_name(role, k)} · pass {done}/{passes}", done, passes)
@@ -157,13 +159,3 @@ def duration(seconds: float) -> str:
     if whole < 3600:
         return f"{whole // 60} min {whole % 60} s"
     return f"{whole // 3600} h {whole % 3600 // 60} min"
-
-
-def cell_name(scene: str, integrator: str, sampler: str, spp: int) -> str:
-    """``cornell_box · path · stratified · 16 spp``."""
-    return f"{scene} · {integrator} · {sampler} · {spp} spp"
-
-
-def replicate_name(role: str, k: int) -> str:
-    """A picture of a cell, counted from 1: ``replicate 3``, ``reference 1``."""
-    return f"reference {k + 1}" if role == "reference" else f"replicate {k + 1}"

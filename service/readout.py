@@ -60,9 +60,9 @@ def known_format(form: str, known: tuple[str, ...]) -> None:
 
 
 def failures(store: Store, experiment: Experiment, data: Path) -> list[dict[str, Any]]:
-    """The failed cells of an experiment, each with the place of its log."""
+    """The failed cells of an experiment, each with what it sets in its scene and the place of its log."""
     rows = store.rows("failures", experiment_id=experiment.id)
-    return [row | {"log": row["log"] and data / row["log"]} for row in rows]
+    return [row | {"sweep": json.loads(row["sweep"] or "{}"), "log": row["log"] and data / row["log"]} for row in rows]
 
 
 def show_status(name: str | None, data: Path, *, as_json: bool) -> None:

@@ -151,8 +151,8 @@ def failures(client: Client, experiment: int, cells: Sequence[Cell]) -> list[dic
     """The failed ones, each with the address of its log."""
     return [
         {
-            "scene": cell.scene, "integrator": cell.integrator, "sampler": cell.sampler, "spp": cell.spp,
-            "error": cell.error, "log": f"{client.url}/api/cells/{cell.cell}/attempts",
+            "scene": cell.scene, "sweep": cell.sweep, "integrator": cell.integrator, "sampler": cell.sampler,
+            "spp": cell.spp, "error": cell.error, "log": f"{client.url}/api/cells/{cell.cell}/attempts",
         }
         for cell in cells
         if cell.state == "failed"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import platform
 import signal
+from functools import partial
 from pathlib import Path
 from types import FrameType
 
@@ -19,6 +20,7 @@ from jobs.artifacts import Artifacts
 from jobs.dispatcher import Dispatcher
 from jobs.executors.local import LocalExecutor
 from jobs.experiments import Experiment, Standing
+from jobs.lister import SceneLister
 from jobs.store import Store
 from renderer import devices
 from renderer.errors import UnknownName
@@ -42,7 +44,7 @@ def run_grid(file: Path, data: Path, *, device: str, executor: str, report: Path
         raise UnknownName("executor", executor, "--executor", EXECUTORS)
     if report:
         refuse_unwritable(report)
-    asked = grid.read(file)
+    asked = grid.read(file, SceneLister(partial(devices.pick, device)))
     if url := (owner.peek(data) or {}).get("url"):
         from service.remote import run_there
 

@@ -111,6 +111,14 @@ class Scene(Wire):
     files: list[str]
 
 
+class SceneParameter(Wire):
+    """What can be swept in a scene, by the name that a grid gives it. ``now``: what the scene's file says."""
+
+    name: str
+    kind: Literal["number", "colour"]
+    now: float | tuple[float, float, float] | None
+
+
 class PointFile(Wire):
     """A point file that a grid may name: ``sets`` sets of ``count`` points, each a pixel's samples at most."""
 

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 from jobs import experiments, grid, plan
 from jobs.artifacts import Artifacts
 from jobs.estimate import estimate
+from jobs.gridsweeps import Lister, nobody
 from jobs.gridtoml import toml_of
 from jobs.plan import Plan
 from jobs.store import Store
@@ -44,24 +45,23 @@ def read(body: bytes, content_type: str) -> schemas.Submission:
     return found
 
 
-def planned(store: Store, artifacts: Artifacts, asked: schemas.Submission) -> Plan:
-    """The cells that a submission means. Raises ``GridError`` with every problem found."""
+def planned(store: Store, artifacts: Artifacts, asked: schemas.Submission, lister: Lister = nobody) -> Plan:
+    """
+    The cells that a submission means; ``lister`` knows what can be swept in a scene. Raises ``GridError`` with every
+    problem found.
+    """
     table: Any = asked.grid if asked.grid is not None else grid.loads(asked.toml or "", asked.origin)
     find = partial(uploads.find, store, artifacts, asked.scenes)
     points = partial(uploadedpoints.find, artifacts, asked.points)
-    return plan.expand(grid.parse(table, find=find, points=points, origin=asked.origin))
+    return plan.expand(grid.parse(table, find=find, points=points, origin=asked.origin, lister=lister))
 
 
 def dry_run(store: Store, wanted: Plan) -> schemas.DryRun:
     """What a plan would render and cost beyond what is there."""
     cost = estimate(wanted, experiments.rates(store, platform.node()), experiments.replicates_had(store))
     asked = wanted.grid
-    axes = {
-        "scenes": len(asked.scenes), "samplers": len(asked.samplers), "integrators": len(asked.integrators),
-        "spp": len(asked.spp), "replicates": asked.replicates,
-    }  # fmt: skip
     known = store.one("experiment_by_digest", digest=asked.digest)
     return schemas.DryRun(
-        name=asked.name, axes=axes, experiment=known["id"] if known and not known["deleted_at"] else None,
+        name=asked.name, axes=asked.axes, experiment=known["id"] if known and not known["deleted_at"] else None,
         toml=toml_of(json.loads(asked.text)), **asdict(cost),
     )  # fmt: skip

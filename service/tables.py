@@ -13,13 +13,15 @@ from rich.text import Text
 from jobs.results import Point
 from renderer.catalog import is_replay
 from renderer.metrics import METRICS
+from renderer.parameters import told
+from service.names import cell_name
 
 SHOWN = ("relmse", "mse_cross", "mse")  # the first that has values stands for the experiment
 
 
 def show_errors(points: list[Point]) -> None:
     """
-    One table per scene and integrator: the error of every sampler at every spp, mean ± standard error.
+    One table per scene, swept values and integrator: the error of every sampler at every spp, mean ± standard error.
 
     Samplers stand side by side where there is room for them, else one below the other. The lowest at each spp is bold,
     replays left out, which are wrong on purpose; spp that a sampler rounded are shown beside its number.
@@ -29,11 +31,13 @@ def show_errors(points: list[Point]) -> None:
         return
     console = Console(highlight=False)
     of_metric = [point for point in points if point.metric == metric]
-    for scene, integrator in dict.fromkeys((point.scene, point.integrator) for point in of_metric):
-        here = [point for point in of_metric if (point.scene, point.integrator) == (scene, integrator)]
-        table = _errors(f"{scene} · {integrator}", here)
+    tables: dict[str, list[Point]] = {}
+    for point in of_metric:
+        tables.setdefault(" · ".join([point.scene, *told(point.sweep), point.integrator]), []).append(point)
+    for title, here in tables.items():
+        table = _errors(title, here)
         if console.measure(table, options=console.options.update(width=10_000)).maximum > console.width:
-            table = _errors(f"{scene} · {integrator}", here, below=True)
+            table = _errors(title, here, below=True)
         console.print(table)
     replicates = sorted({point.n for point in of_metric})
     counts = f"{replicates[0]}" if len(replicates) == 1 else f"{replicates[0]} to {replicates[-1]}"
@@ -90,8 +94,8 @@ def show_failures(failures: list[dict[str, Any]]) -> None:
     console.print(f"[red]{len(failures)} cells failed[/red]; `dartboard retry` queues them again")
     for row in failures:
         log = f" (log: {row['log']})" if row["log"] else ""
-        text = f"  {row['scene']} · {row['integrator']} · {row['sampler']} · {row['spp']} spp: {row['error']}{log}"
-        console.print(Text(text), soft_wrap=True)
+        name = cell_name(row["scene"], row["integrator"], row["sampler"], row["spp"], row["sweep"])
+        console.print(Text(f"  {name}: {row['error']}{log}"), soft_wrap=True)
 
 
 def show_metrics(told: dict[str, Any]) -> None:

@@ -59,7 +59,7 @@ def detail(store: Store, found: Experiment, engine: Engine) -> schemas.Experimen
     return schemas.ExperimentDetail(
         **experiment(store, found, engine), revision=revision, scenes=scenes,
         integrators=[_label("integrator", item) for item in grid["integrators"]],
-        samplers=[_label("sampler", item) for item in grid["samplers"]], spp=grid["spp"], sweeps={},
+        samplers=[_label("sampler", item) for item in grid["samplers"]], spp=grid["spp"], sweeps=_sweeps(grid),
         replicates=grid["replicates"],
         points={item["file"]: item[catalog.POINTS] for item in grid["samplers"] if catalog.POINTS in item},
         replays=[text for item in grid["samplers"] if catalog.is_replay(text := _label("sampler", item))],
@@ -123,6 +123,15 @@ def to_json(value: Any) -> str:
     if any(token in text for token in NO_NUMBERS):  # or a name with these letters: Python's can tell
         return json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text
+
+
+def _sweeps(grid: dict[str, Any]) -> dict[str, list[Any]]:
+    """Parameter → every value that it has in some scene, in the order of the grid."""
+    found: dict[str, list[Any]] = {}
+    for sweep in grid.get("sweeps", ()):
+        values = found.setdefault(sweep["parameter"], [])
+        values += [value for value in sweep["values"] if value not in values]
+    return found
 
 
 def _reference(reference: dict[str, Any] | None) -> str | None:

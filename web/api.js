@@ -25,6 +25,7 @@
 /** @typedef {Schemas["Problem"]} Problem */
 /** @typedef {Schemas["Progress"]} Progress */
 /** @typedef {Schemas["Scene"]} Scene */
+/** @typedef {Schemas["SceneParameter"]} SceneParameter */
 /** @typedef {Schemas["SceneInfo"]} SceneInfo */
 /** @typedef {Schemas["Series"]} Series */
 /** @typedef {Schemas["Slope"]} Slope */
@@ -167,6 +168,8 @@ export const experiments = {
 export const scenes = {
   /** @returns {Promise<Scene[]>} */
   list: () => getJson("/api/scenes"),
+  /** What can be swept in a scene. @param {string} digest @param {string} colour @returns {Promise<SceneParameter[]>} */
+  parameters: (digest, colour) => getJson(`/api/scenes/${digest}/parameters${query({ colour })}`),
   /**
    * @param {Blob} zip a scene's folder @param {string} name @param {string} [main] its XML file
    * @returns {Promise<Scene>}

@@ -237,6 +237,7 @@ from (
 -- name: failures
 select
     cell.id, cell.digest, wanted.role, wanted.scene, wanted.integrator, wanted.sampler, wanted.spp_asked as spp,
+    case when instr(cell.spec, '"sweep":{}') = 0 then cell.spec ->> '$.estimand.sweep' end as sweep,
     cell.error_class, cell.error, (select log from attempt where cell_id = cell.id order by id desc limit 1) as log
 from standing as wanted join cell on cell.id = wanted.cell_id
 where wanted.experiment_id = :experiment_id and wanted.state = 'failed'

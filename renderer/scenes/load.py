@@ -15,6 +15,7 @@ import re
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,7 @@ import mitsuba as mi
 
 from renderer.errors import SceneError, shown
 from renderer.scenes.allowed import PLUGINS, PYTHON_PLUGINS, file_fault, string_fault, unknown_plugin
+from renderer.sweep import Settings
 
 MESSAGE_MAX = 400  # characters of Mitsuba's own text in an error
 
@@ -42,6 +44,11 @@ class LoadedScene:
     width: int
     height: int
     crop: tuple[int, int, int, int]
+
+    @cached_property
+    def settings(self) -> Settings:
+        """What cells set in the scene."""
+        return Settings(self.scene)
 
 
 def load(
@@ -178,9 +185,10 @@ def _children(state: mi.parser.ParserState, parent: int) -> list[tuple[str, int]
 
 
 def _sentence(text: str, folder: Path) -> str:
-    """Mitsuba's error as one line: no source positions, no path of this machine, no content of a file that it read."""
+    """Mitsuba's error as one line: no positions in sources, no traceback, no path of ours, no content of a file."""
     text = text.replace(str(folder) + "/", "")
     text = re.sub(r"\[\w+(\.cpp|\.h)?(:\d+)?\] ", "", text)
     text = re.sub(r'(spectrum file "[^"]*"): ".*', r"\1", text, flags=re.DOTALL)
+    text = re.sub(r"Traceback \(most recent call last\):.*?\n\w+(Error|Exception): ", "", text, flags=re.DOTALL)
     text = re.sub(r"\s+", " ", text).strip()
     return text if len(text) <= MESSAGE_MAX else text[: MESSAGE_MAX - 3] + "..."

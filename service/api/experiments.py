@@ -194,13 +194,13 @@ def _change(engine: Engine, experiment: int, change: Any, deleted: bool = False)
 
 def _dry_run(engine: Engine, asked: schemas.Submission, key: str | None) -> Response:
     with engine.readers.lend() as store:
-        wanted = submission.planned(store, engine.artifacts, asked)
+        wanted = submission.planned(store, engine.artifacts, asked, engine.lister)
         return _json(submission.dry_run(store, wanted).model_dump())
 
 
 def _submit(engine: Engine, asked: schemas.Submission, key: str | None) -> Response:
     with engine.readers.lend() as store:
-        wanted: Plan = submission.planned(store, engine.artifacts, asked)
+        wanted: Plan = submission.planned(store, engine.artifacts, asked, engine.lister)
 
     def change(store: Store, dispatcher: Dispatcher) -> tuple[Experiment, bool]:
         there = store.one("experiment_by_digest", digest=wanted.grid.digest) is not None

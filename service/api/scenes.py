@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from fastapi import APIRouter, Query, Request
+from fastapi import Path as PathParameter
 from fastapi.concurrency import run_in_threadpool
 
 from renderer.errors import shown
@@ -49,6 +50,26 @@ async def upload(
     what = f"the archive of {shown(name)}"
     with await bodies.save(request, bodies.SCENE_BYTES, what, engine.artifacts.data) as archive:
         return _scene(await run_in_threadpool(uploads.receive, engine, archive, name, main))
+
+
+@router.get("/{digest}/parameters")
+def list_parameters(
+    engine: EngineDep,
+    store: StoreDep,
+    digest: Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", description="of a scene in the list of scenes")],
+    colour: Literal["rgb", "spectral"] = "rgb",
+) -> list[schemas.SceneParameter]:
+    """What can be swept in a scene; empty where this machine cannot load one."""
+    built_in = (sources.find(name, Path()) for name in BUILTIN)
+    source = next((one for one in built_in if one.digest == digest), None)
+    if source is None:
+        source = uploads.find(store, engine.artifacts, {digest: digest}, digest)
+    known = engine.lister(source, colour) or {}
+    return [
+        schemas.SceneParameter(name=parameter.short, kind=parameter.kind, now=parameter.now)
+        for parameter in known.values()
+        if parameter.kind != "other"
+    ]
 
 
 def _scene(source: SceneSource) -> schemas.Scene:

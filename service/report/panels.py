@@ -17,6 +17,7 @@ from typing import Any
 from jobs.store import Row
 from renderer import catalog
 from renderer.metrics import METRICS
+from renderer.parameters import told
 from renderer.spec import Choice
 from service.report.reading import Reading
 
@@ -64,7 +65,7 @@ class Panel:
     @property
     def title(self) -> str:
         """The integrators, and what is set in the scene."""
-        return " and ".join(self.integrators) + "".join(f" · {name} = {value}" for name, value in self.sweep.items())
+        return " and ".join(self.integrators) + "".join(f" · {item}" for item in told(self.sweep))
 
     @cached_property
     def spp(self) -> list[int]:

@@ -53,8 +53,22 @@ class Scene:
 
 
 @dataclass(frozen=True)
+class Sweep:
+    """
+    What is set in loaded scenes, value by value.
+
+    scenes  where it applies; empty for all
+    """
+
+    parameter: str
+    values: list[str]
+    scenes: list[str]
+
+
+@dataclass(frozen=True)
 class Setup:
     scenes: list[Scene]
+    sweeps: list[Sweep]
     samplers: list[Plugin]
     integrators: list[Plugin]
     rfilter: str
@@ -74,6 +88,7 @@ def of(reading: Reading) -> Setup:
     grid = reading.grid
     return Setup(
         [_scene(scene, reading) for scene in grid["scenes"]],
+        [_sweep(sweep, len(grid["scenes"])) for sweep in grid.get("sweeps", ())],
         [_plugin("sampler", item, grid["spp"]) for item in grid["samplers"]],
         [_plugin("integrator", item, []) for item in grid["integrators"]],
         label("rfilter", grid["rfilter"]), grid["colour"],
@@ -108,6 +123,11 @@ def _scene(scene: Row, reading: Reading) -> Scene:
         scene["name"], None if uploaded else BUILTIN.get(scene["name"]), width, height, scene["max_depth"],
         _reference(scene["reference"]), uploaded,
     )  # fmt: skip
+
+
+def _sweep(sweep: Row, scenes: int) -> Sweep:
+    everywhere = len(sweep["scenes"]) == scenes
+    return Sweep(sweep["parameter"], [str(value) for value in sweep["values"]], [] if everywhere else sweep["scenes"])
 
 
 def _reference(reference: Row | None) -> str | None:

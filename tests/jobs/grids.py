@@ -48,26 +48,47 @@ def some(values: list, most: int = 4):
 
 def tables():
     """Valid grids as parsed TOML."""
-    return st.fixed_dictionaries(
-        {"scenes": some(SCENES)},
-        optional={
-            "name": st.sampled_from(["a grid", "another"]),
-            "samplers": some(SAMPLERS),
-            "integrators": some(INTEGRATORS),
-            "spp": st.integers(1, 99) | st.lists(st.integers(1, 99), min_size=1, max_size=6),
-            "replicates": st.integers(1, 50),
-            "rfilter": st.sampled_from(["box", "tent", {"type": "gaussian", "stddev": 0.4}]),
-            "colour": st.sampled_from(["rgb", "spectral"]),
-            **settings_of_a_scene,
-        },
-    ).flatmap(_with_scene_tables)
+    return (
+        st.fixed_dictionaries(
+            {"scenes": some(SCENES)},
+            optional={
+                "name": st.sampled_from(["a grid", "another"]),
+                "samplers": some(SAMPLERS),
+                "integrators": some(INTEGRATORS),
+                "spp": st.integers(1, 99) | st.lists(st.integers(1, 99), min_size=1, max_size=6),
+                "replicates": st.integers(1, 50),
+                "rfilter": st.sampled_from(["box", "tent", {"type": "gaussian", "stddev": 0.4}]),
+                "colour": st.sampled_from(["rgb", "spectral"]),
+                **settings_of_a_scene,
+            },
+        )
+        .flatmap(_with_sweeps)
+        .flatmap(_with_scene_tables)
+    )
+
+
+PARAMETERS = ["sphere.bsdf.nu", "lamp.radiance", "white.reflectance"]
+swept_values = some([10, 1000.0, 0.25, [0.1, 0.5, 1.0], [1, 0, 0]])
+
+
+def _with_sweeps(table):
+    """Now and then up to two sweeps, some of them in some of the scenes only."""
+    sweep = st.fixed_dictionaries({"values": swept_values}, optional={"scenes": some(written(table))})
+    sweeps = st.dictionaries(st.sampled_from(PARAMETERS), sweep, min_size=1, max_size=2).map(
+        lambda found: [{"parameter": parameter, **rest} for parameter, rest in found.items()]
+    )
+    return (st.none() | sweeps).map(lambda found: {**table, "sweep": found} if found else table)
+
+
+def written(table):
+    return table["scenes"] if isinstance(table["scenes"], list) else [table["scenes"]]
 
 
 def _with_scene_tables(table):
-    written = table["scenes"] if isinstance(table["scenes"], list) else [table["scenes"]]
     own = st.dictionaries(
-        st.sampled_from(written), st.fixed_dictionaries({}, optional=settings_of_a_scene), max_size=len(set(written))
-    )
+        st.sampled_from(written(table)), st.fixed_dictionaries({}, optional=settings_of_a_scene),
+        max_size=len(set(written(table))),
+    )  # fmt: skip
     return own.map(lambda scene: {**table, "scene": scene} if scene else table)
 
 

@@ -221,7 +221,6 @@ BAD = {
     "name lines": ({"name": "a\nb"}, ["name of grid.toml", "one line"]),
     "name number": ({"name": "42"}, ["name of grid.toml is '42'", "id", "add a word"]),
     "key": ({"smaplers": []}, ["'smaplers'", "grid.toml", "did you mean 'samplers'"]),
-    "sweep": ({"sweep": [{}]}, ["sweep of grid.toml", "later version", "one scene file per material"]),
     "reference": ({"reference": 3}, ["reference of grid.toml is 3", "or false"]),
     "reference key": ({"reference": {"ssp": 3}}, ["'ssp'", "[reference] of grid.toml", "did you mean 'spp'"]),
     "reference spp": ({"reference": {"spp": 0}}, ["spp of [reference] of grid.toml is 0", "from 1"]),

@@ -175,6 +175,9 @@ def test_no_path_is_too_odd_to_be_answered(house: House, text: str) -> None:
         ("scenes is missing in the grid; name at least one", "scenes"),
         ("crop of [scene.x] of the grid is [1, 2], outside the film", "scene"),
         ("spp of [reference] of the grid is 0; give an integer", "reference"),
+        ("sweep of the grid: in scene 'x' there is no parameter 'ball.mu'; its object has ball.nu", "sweep"),
+        ("values[0] of [[sweep]] 1 of the grid is 'x'; give a finite number", "sweep"),
+        ("unknown scene 'y' in scenes[0] of [[sweep]] 0 of the grid; known: x", "sweep"),
         ("the grid asks for 200000 cells", None),
     ],
 )

@@ -3,8 +3,10 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 
 import { allowed, isReplay, replayOf } from "../../web/views/new/catalog.js";
-import { choice, fromQuery, label, START, toQuery, toSubmission } from "../../web/views/new/form.js";
+import { placeOf } from "../../web/views/new/fields.js";
+import { choice, fromQuery, label, START, sweptValues, toQuery, toSubmission } from "../../web/views/new/form.js";
 import { formOf } from "../../web/views/new/prefill.js";
+import { readToml } from "../../web/views/new/toml.js";
 
 const DIGEST = "0123456789abcdef".repeat(4);
 const REPLAY = {
@@ -59,4 +61,54 @@ test("a replay is known by its parameter, and folds away only where leaving it o
 
 test("a text with options has no range", () => {
   assert.equal(allowed(REPLAY), "");
+});
+
+const SWEEPS = [
+  { parameter: "sphere.bsdf.nu", values: "10, 100, 1000", scenes: [] },
+  { parameter: "white.reflectance", values: "0.5, [0.1, 0.9, 0.2]", scenes: ["cornell_box", "my @ room"] },
+];
+
+test("sweeps are in the link as they were typed, and in what is submitted as numbers and colours", () => {
+  const form = { ...START, sweeps: SWEEPS };
+  assert.deepEqual(linked(form), form);
+  assert.deepEqual(toSubmission(form).grid.sweep, [
+    { parameter: "sphere.bsdf.nu", values: [10, 100, 1000] },
+    { parameter: "white.reflectance", values: [0.5, [0.1, 0.9, 0.2]], scenes: ["cornell_box", "my @ room"] },
+  ]);
+  assert.equal("sweep" in toSubmission(START).grid, false);
+});
+
+test("what is no list of numbers goes to the server, which says so beside the field", () => {
+  assert.deepEqual(sweptValues("10 100; x"), [10, 100, "x"]);
+  assert.deepEqual(sweptValues(""), []);
+  assert.deepEqual(sweptValues("1e3, .5"), ["1e3", ".5"]);
+  const half = { ...START, sweeps: [{ parameter: "", values: "", scenes: [] }] };
+  assert.deepEqual(toSubmission(linked(half)).grid.sweep, [{ parameter: "", values: [] }]);
+  assert.deepEqual(fromQuery(new URLSearchParams([["sweep", "{nonsense"]])).sweeps, []);
+  assert.equal(placeOf({ detail: "", field: "sweep" }), "sweep");
+});
+
+test("another experiment's sweeps come back into the form, whatever tables stand around them", () => {
+  const toml = `name = "a"
+scenes = ["cornell_box", "my @ room"]
+samplers = ["independent"]
+integrators = ["path"]
+spp = [4]
+replicates = 2
+resolution = [9, 9]
+
+[[sweep]]
+parameter = "sphere.bsdf.nu"
+values = [10, 100, 1000]
+
+[[sweep]]
+parameter = "white.reflectance"
+values = [0.5, [0.1, 0.9, 0.2]]
+scenes = ["cornell_box", "my @ room"]
+`;
+  const form = formOf({ toml });
+  assert.deepEqual(form.sweeps.map(({ values, ...rest }) => ({ ...rest, values: values.replaceAll(",", ", ").replaceAll("  ", " ") })), SWEEPS);
+  assert.deepEqual(toSubmission(form).grid.sweep, toSubmission({ ...START, sweeps: SWEEPS }).grid.sweep);
+  assert.deepEqual(readToml("[[a]]\nb = 1\n[[a]]\nb = 2\n[c]\nd = 3\n"), { a: [{ b: 1 }, { b: 2 }], c: { d: 3 } });
+  for (const text of ["[[a]\n", "[[a.b]]\n", "a = 1\n[[a]]\n", "[[a]\n]\n"]) assert.equal(readToml(text), null, text);
 });

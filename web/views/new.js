@@ -19,6 +19,7 @@ import { Plugins } from "./new/plugins.js";
 import { formOf, tomlOf } from "./new/prefill.js";
 import { Replays } from "./new/replays.js";
 import { Scenes } from "./new/scenes.js";
+import { Sweeps } from "./new/sweeps.js";
 import { GridEditor } from "./new/text.js";
 import { Pictures, ReferenceFields, Spp } from "./new/values.js";
 import { Failure, Loading } from "./states.js";
@@ -33,6 +34,7 @@ const HINTS = {
   samplers: "where random numbers come from",
   integrators: "how light is followed",
   spp: "each is a point of every curve",
+  sweep: "what is set in a scene, value by value: a material, a lamp, a lens",
   reference: "what errors are measured against",
 };
 const LINKABLE = 6000; // characters of a grid that an address may carry
@@ -156,7 +158,7 @@ function FormFields({ form, change, catalog, known, faults, onUploaded }) {
   const set = (key) => (value) => change({ [key]: value });
   /** @param {readonly unknown[]} values */
   const chosen = (values) => html`<span class="hint number">${values.length} chosen</span>`;
-  const { name, scenes, samplers, integrators, spp, reference } = form;
+  const { name, scenes, samplers, integrators, spp, sweeps, reference } = form;
   return html`<div class="new-form">
     <section class="form-section panel">
       <${TextField}
@@ -198,6 +200,9 @@ function FormFields({ form, change, catalog, known, faults, onUploaded }) {
     <//>
     <${Section} id="spp" title="Samples per pixel" hint=${HINTS.spp} faults=${faults} aside=${chosen(spp)}>
       <${Spp} spp=${spp} onChange=${set("spp")} />
+    <//>
+    <${Section} id="sweep" title="Sweeps" hint=${HINTS.sweep} faults=${faults} aside=${chosen(sweeps)}>
+      <${Sweeps} sweeps=${sweeps} scenes=${scenes} known=${known} colour=${form.colour} onChange=${set("sweeps")} />
     <//>
     <section class="form-section panel" aria-label="Pictures">
       <div class="form-title"><h2>Pictures</h2></div>

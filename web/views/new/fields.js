@@ -15,6 +15,7 @@ export const FIELDS = [
   "samplers",
   "integrators",
   "spp",
+  "sweep",
   "replicates",
   "resolution",
   "max_depth",

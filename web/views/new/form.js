@@ -12,6 +12,8 @@
 /** A file that was sent to the server. @typedef {{name: string, digest: string}} Upload */
 /** A scene; `digest` says which upload is meant, built-in scenes have none. */
 /** @typedef {{name: string, digest?: string}} SceneChoice */
+/** A parameter of the scene and its values, as they were typed; no scenes: all of them. */
+/** @typedef {{parameter: string, values: string, scenes: readonly string[]}} Sweep */
 /** What pictures are measured against; "" is the server's default. */
 /** @typedef {{wanted: boolean, integrator: string, sampler: string, spp: string}} Reference */
 /**
@@ -22,6 +24,7 @@
  * @property {readonly Upload[]} points point files that samplers name
  * @property {readonly Choice[]} integrators
  * @property {readonly string[]} spp
+ * @property {readonly Sweep[]} sweeps
  * @property {string} replicates
  * @property {string} width "" with `height`: as each scene has it
  * @property {string} height
@@ -39,6 +42,7 @@ export const START = {
   points: [],
   integrators: [choice("path")],
   spp: ["4", "16", "64"],
+  sweeps: [],
   replicates: "4",
   width: "128",
   height: "128",
@@ -74,6 +78,16 @@ function scene(text) {
   return name === undefined ? { name: text } : { name, digest };
 }
 
+/** A sweep as a link holds it; what nobody wrote here is left out. @param {string} text @returns {Sweep[]} */
+function sweep(text) {
+  try {
+    const [parameter = "", values = "", ...scenes] = JSON.parse(text).map(String);
+    return [{ parameter, values, scenes }];
+  } catch {
+    return [];
+  }
+}
+
 /**
  * Every field of the form as a list of texts, by its name in the query.
  * @param {Form} form @returns {Record<string, readonly string[]>}
@@ -87,6 +101,7 @@ function fields(form) {
     points: form.points.map(sceneText),
     integrator: form.integrators.map(label),
     spp: [form.spp.join(",")],
+    sweep: form.sweeps.map(({ parameter, values, scenes }) => JSON.stringify([parameter, values, ...scenes])),
     replicates: [form.replicates],
     size: [form.width || form.height ? `${form.width}x${form.height}` : ""],
     depth: [form.depth],
@@ -127,6 +142,7 @@ export function fromQuery(params) {
     points: all("points").map(scene).flatMap(({ name, digest }) => (digest ? [{ name, digest }] : [])),
     integrators: all("integrator").map(choice),
     spp: one("spp").split(",").filter(Boolean),
+    sweeps: all("sweep").flatMap(sweep),
     replicates: one("replicates"),
     width,
     height,
@@ -148,6 +164,15 @@ function value(text) {
   return /^-?\d{1,15}(\.\d+)?$/.test(trimmed) ? Number(trimmed) : trimmed;
 }
 
+/** Numbers and colours, `10, 100` or `[0.8, 0.2, 0.1], 0.5`; else texts, for the server to say what is wrong. @param {string} text */
+export function sweptValues(text) {
+  try {
+    return JSON.parse(`[${text}]`);
+  } catch {
+    return text.split(/[\s,;]+/).filter(Boolean).map(value);
+  }
+}
+
 /** The grid that the form asks for, as the server reads it. @param {Form} form */
 export function toSubmission(form) {
   const { reference } = form;
@@ -158,6 +183,13 @@ export function toSubmission(form) {
     samplers: form.samplers.map(label),
     integrators: form.integrators.map(label),
     spp: form.spp.map(value),
+    ...(form.sweeps.length > 0 && {
+      sweep: form.sweeps.map(({ parameter, values, scenes }) => ({
+        parameter,
+        values: sweptValues(values),
+        ...(scenes.length > 0 && { scenes }),
+      })),
+    }),
     ...(form.replicates !== "" && { replicates: value(form.replicates) }),
     ...((form.width !== "" || form.height !== "") && { resolution: [value(form.width), value(form.height)] }),
     ...(form.depth !== "" && { max_depth: value(form.depth) }),

@@ -70,8 +70,10 @@ function Facts({ result }) {
   const { axes, cells, references, replicates, reused, seconds, disk_bytes, rough, rounded } = result;
   const todo = replicates > reused;
   const guess = todo && rough && html`<span class="tag warn">a guess</span> nothing like it was timed here yet`;
+  const sweeps = Object.entries(axes).filter(([axis]) => axis.includes("."));
   const product = [
     counted(axes.scenes ?? 0, "scene"),
+    ...sweeps.map(([parameter, values]) => `${count(values)} ${parameter}`),
     counted(axes.integrators ?? 0, "integrator"),
     counted(axes.samplers ?? 0, "sampler"),
     counted(axes.spp ?? 0, "spp", "spp"),

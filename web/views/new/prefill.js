@@ -30,6 +30,11 @@ export function formOf({ toml, paths = {}, points = {} }) {
     points: Object.entries(points).map(([name, digest]) => ({ name, digest })),
     integrators: texts(grid.integrators).map(choice),
     spp: texts(grid.spp),
+    sweeps: tables(grid.sweep).map((sweep) => ({
+      parameter: String(sweep.parameter ?? ""),
+      values: texts(sweep.values, JSON.stringify).join(", "),
+      scenes: texts(sweep.scenes),
+    })),
     replicates: String(grid.replicates ?? ""),
     width: width ?? "",
     height: height ?? "",
@@ -55,9 +60,14 @@ function isTable(value) {
   return typeof value === "object" && value !== null && !Array.isArray(value);
 }
 
-/** A list as texts. @param {unknown} value @returns {string[]} */
-function texts(value) {
-  return Array.isArray(value) ? value.map(String) : [];
+/** @param {unknown} value @returns {Record<string, unknown>[]} */
+function tables(value) {
+  return Array.isArray(value) ? value.filter(isTable) : [];
+}
+
+/** A list as texts. @param {unknown} value @param {(one: unknown) => string} [text] @returns {string[]} */
+function texts(value, text = String) {
+  return Array.isArray(value) ? value.map((one) => text(one)) : [];
 }
 
 /** "x" → "x (copy)" → "x (copy 2)". @param {string} name */

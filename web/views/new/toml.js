@@ -59,9 +59,25 @@ class Reader {
     return root;
   }
 
+  /** `[[sweep]]`: one more table of a list. @param {Table} root @returns {Table} */
+  item(root) {
+    this.take("[");
+    const key = this.take();
+    this.take("]");
+    this.take("]");
+    this.take("\n");
+    const list = Object.hasOwn(root, key) ? root[key] : (root[key] = []);
+    if (!Array.isArray(list) || !/^[A-Za-z0-9_-]+$/.test(key)) throw new SyntaxError(`${key} is no list of tables`);
+    /** @type {Table} */
+    const table = {};
+    list.push(table);
+    return table;
+  }
+
   /** `[scene."glass"]`: the table that the following pairs belong to. @param {Table} root @returns {Table} */
   header(root) {
     this.take("[");
+    if (this.next === "[") return this.item(root);
     let table = root;
     for (let key = this.take(); key !== "]"; key = this.take()) {
       for (const part of key.startsWith('"') ? [JSON.parse(key)] : key.split(".").filter(Boolean)) {
