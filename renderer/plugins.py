@@ -32,9 +32,18 @@ def samplers() -> Mapping[str, Any]:
     }
 
 
+def bsdfs() -> Mapping[str, Any]:
+    """Name → class of our BSDFs. Imported here, not before: they derive from the variant that is set."""
+    from renderer.bsdfs.anisophong import AnisoPhong
+
+    return {"anisophong": AnisoPhong}
+
+
 def register_all() -> None:
     """Make our plugins known to the variant that is set."""
     import mitsuba as mi
 
     for name, plugin in samplers().items():
         mi.register_sampler(name, plugin)
+    for name, plugin in bsdfs().items():
+        mi.register_bsdf(name, plugin)

@@ -193,6 +193,28 @@ def points(
 
 
 @app.command()
+def bsdf(
+    bsdf: Annotated[str, typer.Argument(metavar="BSDF", help="NAME or NAME:key=value,…, such as anisophong:nu=10.")],
+    wi: Annotated[
+        str, typer.Option(metavar="X,Y,Z", help="Direction to the viewer, in the local frame: n = z, u = x.")
+    ],
+    wo: Annotated[str, typer.Option(metavar="X,Y,Z", help="Direction to the light.")],
+    device: Device = "auto",
+    as_json: Json = False,
+) -> None:
+    """Evaluate a BSDF of ours for two directions: f·cos θo and the density of its sampling, per steradian."""
+    from service.bsdfing import value_of
+
+    told, notes = value_of(bsdf, wi, wo, device=device)
+    for note in notes:
+        _say(note)
+    if as_json:
+        _print_json(told)
+    else:
+        print(f"f·cos θo = {told['eval']}, pdf = {told['pdf']}")
+
+
+@app.command()
 def results(
     experiment: ExperimentName,
     form: Annotated[str, typer.Option("--format", help="csv, json or table.")] = "table",

@@ -28,10 +28,16 @@ PLUGINS = frozenset(
     tabphase tent thindielectric thinlens timed_sunsky twosided uniform volpath volpathmis volume
     """.split()  # noqa: SIM905 - a hundred words read better than a hundred quoted lines
 )
-# Registered by Mitsuba's Python side. As every integrator of a file they are replaced by the cell's, but may be named.
-PYTHON_PLUGINS = frozenset(
-    {"direct_projective", "prb", "prb_basic", "prb_projective", "prbvolpath", "volprim_rf_basic"}
-)
+OUR_BSDFS = frozenset({"anisophong"})  # renderer.plugins.bsdfs, which cannot be asked without Mitsuba
+# Of renderer.plugins.samplers, those that need no file. A file's sampler is replaced by the cell's, but may be named.
+OUR_SAMPLERS = frozenset(
+    {"eliminated", "halton", "pmj02bn", "poissondisk", "relaxedpoissondisk", "sobol", "zsobol"}
+)  # fmt: skip
+# Registered from Python: our materials and samplers, and Mitsuba's own integrators. Those are replaced by the cell's,
+# as every integrator of a file, but may be named.
+PYTHON_PLUGINS = OUR_BSDFS | OUR_SAMPLERS | {
+    "direct_projective", "prb", "prb_basic", "prb_projective", "prbvolpath", "volprim_rf_basic",
+}  # fmt: skip
 
 EXTENSIONS = frozenset(  # what Mitsuba's plugins read: meshes, pictures, tables; never .so
     {".obj", ".ply", ".serialized", ".exr", ".hdr", ".rgbe", ".pfm", ".ppm", ".png", ".jpg", ".jpeg", ".bmp", ".tga"}
@@ -63,8 +69,9 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
 
 def unknown_plugin(name: str | None) -> str:
     """The sentence for a plugin that is not in the lists."""
-    close = difflib.get_close_matches(name or "", PLUGINS, n=1)
-    hint = f"did you mean {close[0]!r}?" if close else "known are the plugins that Mitsuba 3.9 ships"
+    close = difflib.get_close_matches(name or "", PLUGINS | OUR_BSDFS, n=1)
+    others = ", ".join(sorted(OUR_BSDFS))
+    hint = f"did you mean {close[0]!r}?" if close else f"known are the plugins that Mitsuba 3.9 ships, and {others}"
     return f"unknown plugin type {shown(name or '')}; {hint}"
 
 

@@ -27,9 +27,5 @@ def write(tmp_path: Path) -> Write:
 
 
 @pytest.fixture(scope="session")
-def llvm() -> None:
-    """The variant, set once: it belongs to the process."""
-    import mitsuba as mi
-
-    if mi.variant() != "llvm_ad_rgb":
-        mi.set_variant("llvm_ad_rgb")
+def llvm(variant: str) -> None:
+    """Mitsuba with our plugins, which scenes use."""

@@ -232,3 +232,14 @@ def test_threads_take_turns(write: Write, tmp_path: Path) -> None:
     for thread in threads:
         thread.join()
     assert counts == {0: 1, 1: 2, 2: 3, 3: 4}
+
+
+@pytest.mark.usefixtures("llvm")
+def test_what_a_plugin_of_ours_refuses_is_one_sentence(write: Write) -> None:
+    """Its message comes with a traceback of Python, which is nobody's business."""
+    from renderer.scenes.load import load
+
+    body = SENSOR + '<shape type="sphere"><bsdf type="anisophong"><float name="nu" value="-1"/></bsdf></shape>'
+    with pytest.raises(SceneError, match="nu") as refused:
+        load(write(body), "scene.xml", width=8, height=8)
+    assert "Traceback" not in str(refused.value) and ".py" not in str(refused.value)

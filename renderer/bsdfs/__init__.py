@@ -1,0 +1,1 @@
+"""Materials of our own: the anisotropic Phong model of Ashikhmin and Shirley."""
