@@ -12,35 +12,46 @@ import pytest
 
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import find
+from renderer.scenes.xmlfile import parse
+
+RARE = {"glass_caustic", "hidden_lamp"}  # a path tracer finds their light by luck: black pixels and fireflies
 
 # Loads and renders each scene in one colour mode, in a process of its own: a variant cannot be taken back.
 RENDER = """
-import json, sys, time
+import json, sys
 import mitsuba as mi
-mi.set_variant(sys.argv[1])
+from renderer.variant import use
+use(sys.argv[1])
+import drjit as dr
 import numpy as np
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.load import load
+x, y = (mi.Float(np.random.default_rng(k).random(10_000)) for k in (1, 2))
 out = {}
 for name, scene in BUILTIN.items():
-    start = time.perf_counter()
-    loaded = load(scene.folder, "scene.xml", width=96, height=96)
-    seconds = time.perf_counter() - start
+    seen = out[name] = {"misses": 0, "lamps": 0}
+    for width, height in ((96, 24), (24, 96), (64, 64)):
+        loaded = load(scene.folder, "scene.xml", width=width, height=height)
+        ray, _ = loaded.sensor.sample_ray(0, 0.5, mi.Point2f(x, y), mi.Point2f(0.5), True)
+        hit = loaded.scene.ray_intersect(ray)
+        lamp = hit.emitter(loaded.scene).eval(hit)
+        seen["misses"] += int(dr.count(~hit.is_valid())[0])
+        seen["lamps"] += int(dr.count(dr.max(lamp) > 0)[0])
     integrator = mi.load_dict({"type": "path", "max_depth": 6})
     image = np.array(mi.render(loaded.scene, integrator=integrator, spp=64, seed=3), dtype=np.float64)
-    y = image @ [0.2126, 0.7152, 0.0722]
-    hit = np.array(loaded.scene.ray_test(loaded.sensor.sample_ray(0, 0.5, mi.Point2f(
-        mi.Float(np.random.default_rng(1).random(10_000)), mi.Float(np.random.default_rng(2).random(10_000))),
-        mi.Point2f(0.5), True)[0]))
-    out[name] = {"finite": bool(np.isfinite(image).all()), "mean": y.mean(), "median": float(np.median(y)),
-                 "black": int((y <= 0).sum()), "max": y.max(), "load": seconds, "misses": int((~hit).sum())}
+    light = image @ [0.2126, 0.7152, 0.0722]
+    seen |= {"finite": bool(np.isfinite(image).all()), "mean": light.mean(), "median": float(np.median(light)),
+             "black": int((light <= 0).sum()), "bright": float((light > 3).mean())}
 print(json.dumps(out))
 """
 
 
 def test_every_scene_is_described() -> None:
     """What the catalog tells people is there, in whole sentences, one line each."""
-    assert set(BUILTIN) >= {"cornell_box", "defocus"}
+    assert set(BUILTIN) >= {
+        "cornell_box", "defocus", "sphere_figure", "moon_shadow", "cornell_aniso", "glass_caustic", "glass_nested",
+        "many_lights", "hidden_lamp",
+    }  # fmt: skip
     for name, scene in BUILTIN.items():
         assert scene.name == name == scene.folder.name
         for field in dataclasses.fields(scene):
@@ -50,22 +61,49 @@ def test_every_scene_is_described() -> None:
 
 
 def test_scenes_are_256_square_at_depth_6() -> None:
-    """The defaults of the house, written in the files."""
+    """The defaults of the house, written in the files; light that crosses glass needs more edges."""
     for name in BUILTIN:
         defaults = find(name, Path()).defaults
-        assert (defaults.width, defaults.height, defaults.max_depth, defaults.integrator) == (256, 256, 6, "path")
+        depth = 10 if name.startswith("glass_") else 6
+        assert (defaults.width, defaults.height, defaults.max_depth, defaults.integrator) == (256, 256, depth, "path")
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"])
 def test_pictures_are_finite_well_exposed_and_closed(variant: str) -> None:
-    """Mean luminance near 0.2 (relMSE's ε = 0.01 expects it), no black pixel, no ray that leaves the scene."""
+    """
+    Mean luminance near 0.2 (relMSE's ε = 0.01 expects it), no black pixel, no ray that leaves the scene, no lamp in a
+    picture of any shape unless its description says so. Of RARE only what 64 samples of a path tracer can tell.
+    """
     done = subprocess.run([sys.executable, "-c", RENDER, variant], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     for name, seen in json.loads(done.stdout.splitlines()[-1]).items():
-        assert seen["finite"] and seen["black"] == 0 and seen["misses"] == 0, (name, seen)
-        assert 0.15 < seen["mean"] < 0.35 and 0.08 < seen["median"] < 0.25, (name, seen)
-        if BUILTIN[name].lamp_in_frame is None:
-            assert seen["max"] < 3, (name, seen)  # no lamp seen, no firefly
+        assert seen["finite"] and seen["misses"] == 0, (name, seen)
+        assert 0.13 < seen["mean"] < 0.35, (name, seen)
+        assert bool(seen["lamps"]) == (BUILTIN[name].lamp_in_frame is not None), (name, seen)
+        if name not in RARE:
+            assert seen["black"] == 0 and 0.08 < seen["median"] < 0.25, (name, seen)
+        if name not in RARE and BUILTIN[name].lamp_in_frame is None:
+            assert seen["bright"] < 0.005, (name, seen)  # highlights, no fireflies
+
+
+def test_materials_have_short_names() -> None:
+    """A sweep says sphere.bsdf.nu in every scene that has the anisotropic material, and most have it."""
+    found = 0
+    for name in BUILTIN:
+        shapes = [e for e in parse((BUILTIN[name].folder / "scene.xml").read_bytes()).children if e.tag == "shape"]
+        anisotropic = [e for e in shapes for b in e.children if b.attributes.get("type") == "anisophong"]
+        found += bool(anisotropic)
+        assert not anisotropic or "sphere" in {e.attributes["id"] for e in anisotropic}, name
+        assert all(e.attributes.get("id") for e in shapes), name
+        assert not any("id" in b.attributes for e in anisotropic for b in e.children), name  # it would rename the key
+    assert found >= 4
+
+
+def test_corridor_has_64_lamps_of_very_different_power() -> None:
+    children = parse((BUILTIN["many_lights"].folder / "scene.xml").read_bytes()).children
+    lamps = [e for shape in children for e in shape.children if e.tag == "emitter"]
+    radiance = [max(map(float, lamp.children[0].attributes["value"].split())) for lamp in lamps]
+    assert len(radiance) == 64 and max(radiance) > 1000 * min(radiance)
 
 
 def test_reading_scenes_needs_no_mitsuba() -> None:

@@ -96,11 +96,13 @@ def test_a_name_may_be_a_built_in_a_file_or_a_folder(folder: Path) -> None:
 
 
 WRONG = {
-    "nowhere.xml": "scene 'nowhere.xml' is not in {base}; a scene is a path from there, or one of cornell_box, defocus",
-    "notes.txt": "scene 'notes.txt' is not an .xml file; name a Mitsuba XML file or a folder that holds one",
+    "nowhere.xml": "scene 'nowhere.xml' is not in {base}; a scene is a path from there, or one of "
+    + ", ".join(BUILTIN),
+    "notes.txt": "scene 'notes.txt' is neither an .xml nor a .pbrt file; name a Mitsuba or pbrt-v3 file, or "
+    "a folder that holds one",
     "text.xml": "scene 'text.xml' is refused: text.xml is not well-formed XML: syntax error in line 1",
     "bsdf.xml": "scene 'bsdf.xml' is refused: bsdf.xml, line 2: unknown plugin type 'difuse'; did you mean 'diffuse'?",
-    "none": "the folder 'none' holds no .xml file; name the file, or call the main one scene.xml",
+    "none": "the folder 'none' holds no .xml file, and no .pbrt file; name the file, or call the main one scene.xml",
     "two": "the folder 'two' holds the 2 files a.xml, b.xml; name the file, or call the main one scene.xml",
     "a.xml": "scene 'a.xml' is refused: a.xml, line 2: the file 'gone.ply' does not exist in the scene's folder",
 }
