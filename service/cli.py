@@ -130,7 +130,7 @@ def catalog(as_json: Json = False) -> None:
 
 @app.command()
 def render(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A built-in scene, a Mitsuba XML file, or its folder.")],
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A built-in scene, a Mitsuba or pbrt-v3 file, or its folder.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.exr", help="The picture to write.")],
     integrator: Annotated[str | None, typer.Option(help="NAME or NAME:key=value,… (else the scene's).")] = None,
     sampler: Annotated[str | None, typer.Option(help="NAME or NAME:key=value,… (else the scene's).")] = None,
@@ -212,6 +212,19 @@ def bsdf(
         _print_json(told)
     else:
         print(f"f·cos θo = {told['eval']}, pdf = {told['pdf']}")
+
+
+@app.command("import")
+def import_(
+    scene: Annotated[Path, typer.Argument(metavar="SCENE.pbrt", help="A pbrt-v3 scene file.")],
+    output: Annotated[Path, typer.Option("--output", "-o", metavar="FOLDER", help="A new folder for the scene.")],
+    as_json: Json = False,
+) -> None:
+    """Write a pbrt-v3 scene as a Mitsuba scene, for editing; say what was replaced or ignored."""
+    from service.importing import import_scene, show
+
+    told = import_scene(scene, output)
+    _print_json(told) if as_json else show(told)
 
 
 @app.command()

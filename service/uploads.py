@@ -32,6 +32,7 @@ from service.problems import TooLarge
 
 T = TypeVar("T")
 
+MAIN_KINDS = (".xml", sources.PBRT)  # of scene files
 MAX_FILES = 2000  # in an archive
 MAX_BYTES = 2**29  # unpacked
 MAX_NAME = 200  # characters
@@ -43,7 +44,7 @@ def receive(engine: Engine, archive: IO[bytes], name: str, main: str | None) -> 
     """
     Vet the scene in a zip file and keep a snapshot of it.
 
-    name  what people call it; main  its XML file, where the folder holds several
+    name  what people call it; main  its scene file, where the folder holds several
     Raises ``SceneError`` with the reasons, ``TooLarge`` over a limit.
     """
     _check_name(name)
@@ -110,11 +111,11 @@ def _check_name(name: str) -> None:
 
 def _main(folder: Path, main: str | None, name: str) -> str:
     """What to look for in the folder: nothing outside of it, whatever a client names."""
-    there = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.xml"))
+    there = sorted(path.relative_to(folder).as_posix() for kind in MAIN_KINDS for path in folder.rglob(f"*{kind}"))
     if main is None:
         return "."
     if main not in there:
-        held = ", ".join(there[:5]) or "no .xml file"
+        held = ", ".join(there[:5]) or "no .xml or .pbrt file"
         raise SceneError(f"there is no {shown(main)} in the archive of {shown(name)}; it holds {held}")
     return main
 
@@ -159,8 +160,8 @@ def _fault(entry: zipfile.ZipInfo) -> str | None:
     if fault := file_fault(entry.filename):
         return fault
     suffix = path.suffix.lower()
-    if suffix != ".xml" and suffix not in EXTENSIONS:
-        return f"has an extension that no scene needs; allowed: .xml {' '.join(sorted(EXTENSIONS))}"
+    if suffix not in MAIN_KINDS and suffix not in EXTENSIONS:
+        return f"has an extension that no scene needs; allowed: {' '.join([*MAIN_KINDS, *sorted(EXTENSIONS)])}"
     return None
 
 

@@ -18,6 +18,7 @@ WITHOUT_MITSUBA = (
     "renderer.spec", "renderer.catalog", "renderer.errors", "renderer.metrics", "renderer.images", "renderer.variant",
     "renderer.llvm", "renderer.devices", "renderer.previews", "renderer.scenes.sources", "renderer.scenes.builtin",
     "renderer.scenes.vet", "renderer.samplers.pointfile", "renderer.samplers.packing", "renderer.zips",
+    "renderer.bsdfs.parameters", "renderer.bsdfs.formula", "renderer.parameters",
 )  # fmt: skip
 
 

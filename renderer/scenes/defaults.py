@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
+from renderer import catalog
+from renderer.errors import DartboardError
 from renderer.scenes.xmlfile import Element
 
 WRAPPERS = frozenset({"aov", "moment", "stokes"})  # integrators that only add channels to the one inside
@@ -23,7 +25,8 @@ class SceneDefaults:
     width, height  of the film, in pixels
     max_depth      edges of the longest path (Mitsuba's count; -1: unlimited)
     integrator     plugin name, of the inner one where the outer only adds channels
-    sampler, spp   plugin name and samples per pixel, as asked (samplers may round)
+    sampler        as people write it, NAME or NAME:key=value with the parameters that the catalog knows
+    spp            samples per pixel, as asked (samplers may round)
     """
 
     width: int = 256
@@ -48,9 +51,25 @@ def defaults_of(root: Element) -> SceneDefaults:
         height=ours.height if film is None else _integer(film, "height", 576),
         max_depth=ours.max_depth if integrator is None else _integer(integrator, "max_depth", -1),
         integrator=ours.integrator if integrator is None else integrator.attributes["type"],
-        sampler=ours.sampler if sampler is None else sampler.attributes["type"],
+        sampler=ours.sampler if sampler is None else _sampler(sampler),
         spp=ours.spp if sampler is None else _integer(sampler, "sample_count", 4),
     )
+
+
+def _sampler(element: Element) -> str:
+    """A sampler with its parameters; only its name where the catalog refuses them."""
+    name = element.attributes["type"]
+    try:
+        known = {parameter.name for parameter in catalog.find("sampler", name).parameters}
+        given = {
+            child.attributes["name"]: child.attributes.get("value", "")
+            for tag in ("boolean", "integer", "float")
+            for child in _children(element, tag)
+            if child.attributes.get("name") in known
+        }
+        return catalog.label("sampler", catalog.resolve("sampler", {"type": name, **given}))
+    except DartboardError:
+        return name
 
 
 def _first(parent: Element | None, tag: str) -> Element | None:

@@ -6,6 +6,9 @@ and one digest over their contents. ``snapshot`` copies exactly these files into
 render that copy, so a scene that is edited later is another scene and never a wrong picture. What else lies in the
 folder (a README, old renderings) is no part of the scene.
 
+A pbrt-v3 file is converted first, into a folder of its own that lives as long as its ``SceneSource``; from there on it
+is an XML scene like any other.
+
 What may be in a scene is the business of ``vet``; loading it, of ``load``. No Mitsuba here.
 """
 
@@ -13,12 +16,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import os
 import shutil
 import tempfile
 import time
+import weakref
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from renderer.errors import EnvironmentProblem, SceneError, UnknownName, shown
@@ -30,7 +35,10 @@ __all__ = ["SceneDefaults", "SceneFile", "SceneSource", "find", "snapshot"]
 
 MAIN = "scene.xml"  # the main file of a folder that holds several
 REASONS_SHOWN = 3  # in one error; ``vet`` gives all
+PBRT = ".pbrt"
 ABANDONED_S = 3600  # a half-made copy that is older belongs to a process that was killed
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -45,6 +53,7 @@ class SceneSource:
     digest    SHA-256 of main and files: the same on every machine, whatever else the folder holds
     builtin   True: shipped with Dartboard
     defaults  what the file itself says about size, integrator and sampler
+    notes     of a pbrt file: what was replaced or ignored, a sentence each; logged as warnings, too
     """
 
     name: str
@@ -54,12 +63,24 @@ class SceneSource:
     digest: str
     builtin: bool
     defaults: SceneDefaults
+    notes: tuple[str, ...] = ()
+    lent: TemporaryFolder | None = field(default=None, repr=False, compare=False)  # ``folder``, if it was made for this
+
+
+class TemporaryFolder:
+    """A folder that is removed when nobody holds this any more, or when the process ends."""
+
+    def __init__(self) -> None:
+        self.path = Path(tempfile.mkdtemp(prefix="dartboard-scene-"))
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
 
 def find(name: str, base: Path) -> SceneSource:
     """
-    The scene that ``name`` means: a built-in, or a path relative to ``base`` of a Mitsuba XML file or of a folder
-    that holds ``scene.xml`` or just one XML file. Raises ``UnknownName`` or ``SceneError``.
+    The scene that ``name`` means: a built-in, or a path relative to ``base`` of a Mitsuba XML file, of a pbrt-v3 file,
+    or of a folder that holds ``scene.xml``, just one XML file, or no XML and just one pbrt file.
+
+    Raises ``UnknownName`` or ``SceneError``.
     """
     if name in BUILTIN:
         return _read(name, BUILTIN[name].folder, MAIN, builtin=True)
@@ -69,11 +90,16 @@ def find(name: str, base: Path) -> SceneSource:
     except (OSError, ValueError):  # a name that no file system takes
         is_folder = is_file = False
     if is_folder:
-        return _read(name, path, _main_of(path, name), builtin=False)
-    if is_file and path.suffix.lower() == ".xml":
+        path = path / _main_of(path, name)
+    if path.suffix.lower() == PBRT and (is_file or is_folder):
+        return _converted(name, path)
+    if is_folder or (is_file and path.suffix.lower() == ".xml"):
         return _read(name, path.parent, path.name, builtin=False)
     if is_file:
-        raise SceneError(f"scene {shown(name)} is not an .xml file; name a Mitsuba XML file or a folder that holds one")
+        raise SceneError(
+            f"scene {shown(name)} is neither an .xml nor a .pbrt file; name a Mitsuba or pbrt-v3 file, or a folder "
+            "that holds one"
+        )
     if "/" not in name and "." not in name:
         raise UnknownName("scene", name, "", BUILTIN)
     raise SceneError(f"scene {shown(name)} is not in {base}; a scene is a path from there, or one of {_builtins()}")
@@ -102,6 +128,21 @@ def snapshot(source: SceneSource, into: Path) -> Path:
     except OSError as error:
         reason = f"{error.strerror}; free space there or name another folder"
         raise EnvironmentProblem(f"cannot copy scene {source.name!r} to {into}: {reason}") from error
+
+
+def _converted(name: str, path: Path) -> SceneSource:
+    """A pbrt file as the Mitsuba scene that is made of it."""
+    from renderer.scenes.pbrt import convert  # which needs numpy: not before somebody has such a file
+
+    lent = TemporaryFolder()
+    try:
+        notes = convert.convert(path, lent.path)
+    except OSError as error:
+        reason = f"{error.strerror}; free space in {lent.path.parent}, or name another folder with TMPDIR"
+        raise EnvironmentProblem(f"cannot convert scene {name!r}: {reason}") from error
+    for note in notes:
+        log.warning("%s", note)
+    return replace(_read(name, lent.path, MAIN, builtin=False), notes=tuple(notes), lent=lent)
 
 
 def _make(source: SceneSource, target: Path) -> Path:
@@ -142,10 +183,10 @@ def _read(name: str, folder: Path, main: str, builtin: bool) -> SceneSource:
 def _main_of(folder: Path, name: str) -> str:
     if (folder / MAIN).is_file():
         return MAIN
-    found = sorted(path.name for path in folder.glob("*.xml"))
+    found = sorted(path.name for path in folder.glob("*.xml")) or sorted(path.name for path in folder.glob("*.pbrt"))
     if len(found) == 1:
         return found[0]
-    held = f"the {len(found)} files {', '.join(found[:5])}" if found else "no .xml file"
+    held = f"the {len(found)} files {', '.join(found[:5])}" if found else "no .xml file, and no .pbrt file"
     raise SceneError(f"the folder {shown(name)} holds {held}; name the file, or call the main one {MAIN}")
 
 
