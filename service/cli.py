@@ -130,7 +130,7 @@ def catalog(as_json: Json = False) -> None:
 
 @app.command()
 def render(
-    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A built-in scene, a Mitsuba or pbrt-v3 file, or its folder.")],
+    scene: Annotated[str, typer.Argument(metavar="SCENE", help="A built-in scene, a scene file, or its folder.")],
     output: Annotated[Path, typer.Option("--output", "-o", metavar="OUT.exr", help="The picture to write.")],
     integrator: Annotated[str | None, typer.Option(help="NAME or NAME:key=value,… (else the scene's).")] = None,
     sampler: Annotated[str | None, typer.Option(help="NAME or NAME:key=value,… (else the scene's).")] = None,
