@@ -45,7 +45,7 @@ def show_errors(points: list[Point]) -> None:
 
 
 def _errors(title: str, points: list[Point], *, below: bool = False) -> Table:
-    """The errors of some samplers, side by side or one ``below`` the other."""
+    """The errors of some samplers, side by side, or one ``below`` the other with parameters and errors on new lines."""
     samplers = list(dict.fromkeys(point.sampler for point in points))
     levels = sorted({point.spp for point in points})
     found = {(point.sampler, point.spp): point for point in points}
@@ -53,7 +53,11 @@ def _errors(title: str, points: list[Point], *, below: bool = False) -> Table:
         spp: [point.mean for point in points if point.spp == spp and not is_replay(point.sampler)] for spp in levels
     }
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    names = [Text(f"{sampler} (replay)" if is_replay(sampler) else sampler) for sampler in samplers]
+    line = "\n  " if below else " "
+    names = [
+        Text((sampler.replace(":", ":\n  ") if below else sampler) + (f"{line}(replay)" if is_replay(sampler) else ""))
+        for sampler in samplers
+    ]
     table.add_column("sampler" if below else "spp", justify="left" if below else "right", overflow="fold")
     for heading in (f"{spp} spp" for spp in levels) if below else names:
         table.add_column(heading, justify="right")
@@ -61,15 +65,17 @@ def _errors(title: str, points: list[Point], *, below: bool = False) -> Table:
     if not below:
         rows = [(Text(str(spp)), [(sampler, spp) for sampler in samplers]) for spp in levels]
     for heading, places in rows:
-        table.add_row(heading, *(_cell(found.get(place), min(right[place[1]], default=None)) for place in places))
+        cells = (_cell(found.get(place), min(right[place[1]], default=None), below) for place in places)
+        table.add_row(heading, *cells, end_section=below)
     return table
 
 
-def _cell(point: Point | None, best: float | None) -> Text:
+def _cell(point: Point | None, best: float | None, folded: bool) -> Text:
     if point is None:
         return Text("–", style="dim")
-    error = f" ± {point.error:.1e}" if point.error is not None else ""
-    rounded = f" ({point.spp_actual} spp)" if point.spp_actual != point.spp else ""
+    line = "\n" if folded else " "
+    error = f"{line}± {point.error:.1e}" if point.error is not None else ""
+    rounded = f"{line}({point.spp_actual} spp)" if point.spp_actual != point.spp else ""
     return Text(
         f"{point.mean:.3e}{error}{rounded}", style="bold" if point.mean == best and not is_replay(point.sampler) else ""
     )
