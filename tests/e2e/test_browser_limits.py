@@ -120,7 +120,7 @@ def test_a_scene_is_sent_and_its_failure_explained(watch: Watch, empty: Server, 
     packed(tmp_path / "escaping.zip", {"../room.xml": ROOM})
     packed(tmp_path / "room.zip", {"room.xml": ROOM, "wall.ply": "no mesh"})
     scenes = page.get_by_role("region", name="Scenes")
-    scenes.get_by_role("checkbox", name="Cornell box").uncheck()
+    scenes.get_by_role("checkbox", name="Cornell box cornell_box").uncheck()
     chooser = scenes.locator("input[type=file][accept*=zip]")
     chooser.set_input_files(tmp_path / "escaping.zip")
     expect(scenes.get_by_role("alert")).to_contain_text("../room.xml")
