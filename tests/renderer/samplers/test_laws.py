@@ -191,7 +191,7 @@ def test_one_dimension_is_stratified(name: str, spp: int) -> None:
         assert (np.sort((samples * spp).astype(int), axis=1) == np.arange(spp)).all()
 
 
-@pytest.mark.parametrize(("name", "least"), [("poissondisk", 0.70), ("relaxedpoissondisk", 0.58), ("eliminated", 0.60)])
+@pytest.mark.parametrize(("name", "least"), [("poissondisk", 0.70), ("relaxedpoissondisk", 0.58), ("eliminated", 0.65)])
 @pytest.mark.parametrize("spp", COUNTS)
 def test_poisson_points_keep_their_distance_on_the_torus(name: str, least: float, spp: int) -> None:
     """Shift and symmetry change no distance: what the tables promise holds in every pixel and dimension."""
