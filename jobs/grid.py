@@ -14,15 +14,16 @@ A grid has these keys; all but ``scenes`` may be left out. Where a list is expec
     spp          samples per pixel, 1 to 10⁷ (default: 16, 64, 256); every sampler rounds by its own rule
     replicates   pictures of each cell with different seeds, 1 to 1000 (default: 4, enough to see a spread)
     resolution   [width, height] in pixels (default: the scene's)
-    crop         [x, y, width, height] in pixels (default: the whole film)
+    crop         [x, y, width, height] in pixels (default: the scene's, in its place at any resolution)
     max_depth    edges of the longest path, -1 is unlimited (default: the scene's)
-    rfilter      reconstruction filter (default: box, which keeps pixels independent)
+    rfilter      reconstruction filter (default: the one that the scene file names, else box, which keeps pixels
+                 independent; all built-in scenes have box)
     colour       "rgb" or "spectral" (default: rgb)
     reference    what to measure against: { integrator, sampler, spp, replicates }, or false for no reference
                  (default: path, independent, 4096 spp in total, 2 replicates)
     sweep        tables [[sweep]]: parameter of a scene ("sphere.bsdf.nu"), values (numbers, or colours [r, g, b]), and
                  scenes, where it does not apply to all; several multiply
-    scene        tables [scene.NAME]: resolution, crop, max_depth, reference where one scene differs
+    scene        tables [scene.NAME]: resolution, crop, max_depth, rfilter, reference where one scene differs
 """
 
 from __future__ import annotations
@@ -114,7 +115,6 @@ def parse(
     grid = Table(data, origin, GRID_KEYS, problems)
     samplers = _choices(grid, "samplers", "sampler", "independent")
     integrators = _choices(grid, "integrators", "integrator", "path")
-    rfilter = choice(grid, "rfilter", grid.data.get("rfilter", "box"), grid.place("rfilter"))
     files = points_of(grid, samplers, points)
     spp = _spp(grid, samplers, files)
     name, colour, replicates = _name(grid), _colour(grid), grid.integer("replicates", 1, MAX_REPLICATES)
@@ -124,10 +124,10 @@ def parse(
     scenes = scenes_of(grid, names, integrators, find)
     gridsweeps.check(grid, sweeps, scenes, colour or "rgb", lister)
     problems.raise_any()
-    assert name and rfilter and colour, "what could not be read is a problem"
+    assert name and colour, "what could not be read is a problem"
     return GridSpec(
-        name, tuple(scenes), tuple(bind(samplers, files)), tuple(integrators), tuple(spp), replicates or 4, rfilter,
-        colour, tuple({source.digest: source for source in files.values()}.values()), tuple(sweeps),
+        name, tuple(scenes), tuple(bind(samplers, files)), tuple(integrators), tuple(spp), replicates or 4, colour,
+        tuple({source.digest: source for source in files.values()}.values()), tuple(sweeps),
     )  # fmt: skip
 
 

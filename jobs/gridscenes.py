@@ -1,5 +1,5 @@
 """
-What holds for each scene of a grid: resolution, crop, max_depth and reference.
+What holds for each scene of a grid: resolution, crop, max_depth, filter and reference.
 
 They may be said for the whole grid, again in ``[scene.NAME]`` for one scene, and the scene file has its own: the
 nearest one counts, for a reference field by field. The checks that need a scene are here too. No Mitsuba.
@@ -7,6 +7,7 @@ nearest one counts, for a reference field by field. The checks that need a scene
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,8 +22,10 @@ from renderer.spec import Choice
 
 Finder = Callable[[str], sources.SceneSource]  # raises DartboardError for what is no scene
 
-SCENE_KEYS = ("resolution", "crop", "max_depth", "reference")
+SCENE_KEYS = ("resolution", "crop", "max_depth", "rfilter", "reference")
 REFERENCE_KEYS = ("integrator", "sampler", "spp", "replicates")
+
+log = logging.getLogger(__name__)
 
 
 def scenes_of(grid: Table, names: Mapping[str, str], integrators: Sequence[Choice], find: Finder) -> list[SceneRequest]:
@@ -53,6 +56,7 @@ class _Settings:
     resolution: tuple[int, ...] | None
     crop: tuple[int, ...] | None
     max_depth: int | None
+    rfilter: Choice | None
     reference: Mapping[str, Any] | bool | None
 
     @classmethod
@@ -66,6 +70,7 @@ class _Settings:
             table.integers("resolution", "width, height", 1, MAX_SIDE),
             table.integers("crop", "x, y, width, height", 0, MAX_SIDE),
             depth,
+            choice(table, "rfilter", table.data["rfilter"], table.place("rfilter")) if "rfilter" in table else None,
             _reference_fields(table, reference_place),
         )
 
@@ -123,6 +128,8 @@ def _scene(name: str, place: str, find: Finder, own: _Settings | None, common: _
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         problems.add(f"{where}: the file asks for {width}×{height} pixels; set resolution, 1 to {MAX_SIDE} per side")
     crop, crop_place = nearest("crop")
+    if crop is None and not any(level.failed("crop") for level in levels):
+        crop, crop_place = default.crop_at(width, height), f"{place}: the crop of the file"
     if crop and not any(level.failed("resolution") for level in levels):
         crop = _check_crop(problems, crop, crop_place, width, height, name)
     pixels = crop[2] * crop[3] if crop else width * height
@@ -133,13 +140,27 @@ def _scene(name: str, place: str, find: Finder, own: _Settings | None, common: _
         depth = default.max_depth
         if not -1 <= depth <= catalog.MAX_DEPTH or depth == 0:
             problems.add(f"{where}: the file asks for max_depth {depth}; set max_depth: 1 or more, or -1 for unlimited")
-    return SceneRequest(source, width, height, crop, depth, _reference(common, own))
+    rfilter = nearest("rfilter")[0] or problems.attempt(lambda: _own_filter(source, place))
+    if rfilter is None:
+        return None
+    return SceneRequest(source, width, height, crop, depth, rfilter, _reference(common, own))
+
+
+def _own_filter(source: sources.SceneSource, place: str) -> Choice:
+    """The filter of the scene file; one that mixes pixels is told, as measuring errors wants independent pixels."""
+    rfilter = catalog.resolve("rfilter", source.defaults.rfilter, place)
+    if rfilter.name != "box":
+        log.warning(
+            "%s: the file of %s has the filter %s, which holds as the grid names none; pixels share samples with their "
+            'neighbours then, so say rfilter = "box" for independent ones', place, source.name, source.defaults.rfilter,
+        )  # fmt: skip
+    return rfilter
 
 
 def _check_crop(problems: Problems, crop: Crop, place: str, width: int, height: int, scene: str) -> Crop | None:
     """The crop, None where it is the whole film, so that both spellings are one estimand."""
     x, y, wide, high = crop
-    if wide < 1 or high < 1 or x + wide > width or y + high > height:
+    if min(x, y) < 0 or min(wide, high) < 1 or x + wide > width or y + high > height:
         problems.add(
             f"{place} is {list(crop)}, outside the {width}×{height} film of {scene}; "
             "give [x, y, width, height] inside it, in pixels from the top left"
@@ -228,7 +249,7 @@ def _check_twins(grid: Table, scenes: Iterable[SceneRequest]) -> None:
     """The same files with the same settings under two names would be one set of cells with two names."""
     first: dict[tuple[object, ...], str] = {}
     for scene in scenes:
-        key = (scene.source.digest, scene.width, scene.height, scene.crop, scene.max_depth)
+        key = (scene.source.digest, scene.width, scene.height, scene.crop, scene.max_depth, scene.rfilter)
         other = first.setdefault(key, scene.source.name)
         if other != scene.source.name:
             names = f"{shown(other)} and {shown(scene.source.name)}"

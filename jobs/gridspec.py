@@ -61,6 +61,7 @@ class SceneRequest:
 
     crop       None for the whole film
     max_depth  holds for integrators that have none of their own
+    rfilter    reconstruction filter
     reference  None for no reference
     """
 
@@ -69,6 +70,7 @@ class SceneRequest:
     height: int
     crop: Crop | None
     max_depth: int
+    rfilter: Choice
     reference: ReferenceRequest | None
 
     @property
@@ -76,13 +78,20 @@ class SceneRequest:
         """(width, height) of the picture that is rendered, in pixels."""
         return (self.crop[2], self.crop[3]) if self.crop else (self.width, self.height)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self, rfilter: Choice) -> dict[str, Any]:
+        """
+        As part of a grid whose filter is ``rfilter``. The scene's own is told where it is another, or where the file
+        has one that would come back if nobody spoke; so is the whole film where the file has a crop.
+        """
+        told = self.rfilter != rfilter or self.source.defaults.rfilter != "box"
+        whole = (0, 0, self.width, self.height) if self.source.defaults.crop else None
         return {
+            **({"rfilter": json.loads(self.rfilter.text)} if told else {}),
             "name": self.source.name,
             "digest": self.source.digest,
             "width": self.width,
             "height": self.height,
-            "crop": self.crop,
+            "crop": self.crop or whole,
             "max_depth": self.max_depth,
             "reference": self.reference and self.reference.as_json(),
         }
@@ -120,10 +129,14 @@ class GridSpec:
     integrators: tuple[Choice, ...]
     spp: tuple[int, ...]
     replicates: int
-    rfilter: Choice
     colour: str
     points: tuple[PointSource, ...] = ()
     sweeps: tuple[Sweep, ...] = ()
+
+    @property
+    def rfilter(self) -> Choice:
+        """The filter of the first scene, which is that of the others unless they say otherwise."""
+        return self.scenes[0].rfilter
 
     @property
     def axes(self) -> dict[str, int]:
@@ -154,7 +167,7 @@ class GridSpec:
                 "rfilter": json.loads(self.rfilter.text),
                 "samplers": [json.loads(choice.text) for choice in self.samplers],
                 "scene_loader": SCENE_LOADER,
-                "scenes": [scene.as_json() for scene in self.scenes],
+                "scenes": [scene.as_json(self.rfilter) for scene in self.scenes],
                 "spp": self.spp,
             }
         )

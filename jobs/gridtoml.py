@@ -30,7 +30,8 @@ def toml_of(grid: Json) -> str:
         f"spp = {json.dumps(grid['spp'])}",
         f"replicates = {grid['replicates']}",
     ]
-    if (rfilter := _label("rfilter", grid["rfilter"])) != "box":
+    rfilter = _label("rfilter", grid["rfilter"])
+    if said := rfilter != "box" or "rfilter" in scenes[0]:
         lines.append(f"rfilter = {_text(rfilter)}")
     if grid["colour"] != "rgb":
         lines.append(f"colour = {_text(grid['colour'])}")
@@ -39,6 +40,8 @@ def toml_of(grid: Json) -> str:
         own = {key: value for key, value in _settings(scene).items() if value != common.get(key)}
         if "crop" in common and "crop" not in _settings(scene):
             own["crop"] = f"[0, 0, {scene['width']}, {scene['height']}]"  # the whole film
+        if "rfilter" in scene and not (said and _label("rfilter", scene["rfilter"]) == rfilter):
+            own["rfilter"] = _text(_label("rfilter", scene["rfilter"]))
         if own:
             lines += ["", f"[scene.{_text(scene['name'])}]", *(f"{key} = {value}" for key, value in own.items())]
     everywhere = [scene["name"] for scene in scenes]

@@ -143,7 +143,7 @@ def _estimand(
         crop=scene.crop,
         max_depth=path_lengths(integrator, scene.max_depth),
         hide_emitters=bool(dict(integrator.parameters).get("hide_emitters", False)),
-        rfilter=grid.rfilter,
+        rfilter=scene.rfilter,
         colour=grid.colour,
         sweep=sweep,
     )

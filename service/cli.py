@@ -138,6 +138,8 @@ def render(
     seed: Annotated[int, typer.Option(help="Which replicate: another number, other samples.", min=0)] = 0,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Resolution in pixels (else the scene's).")] = None,
     max_depth: Annotated[int | None, typer.Option(help="Edges of the longest path; -1: unlimited.")] = None,
+    crop: Annotated[str | None, typer.Option(metavar="X,Y,W,H", help="Part of the film (else the scene's).")] = None,
+    rfilter: Annotated[str | None, typer.Option(help="Pixel filter: NAME or NAME:key=value,…")] = None,
     device: Device = "auto",
     as_json: Json = False,
 ) -> None:
@@ -146,7 +148,7 @@ def render(
 
     told = render_one(
         scene, output, integrator=integrator, sampler=sampler, spp=spp, seed=seed, size=size, max_depth=max_depth,
-        device=device,
+        crop=crop, rfilter=rfilter, device=device,
     )  # fmt: skip
     if as_json:
         _print_json(told)

@@ -11,9 +11,9 @@ from typing import Any
 from jobs.executors.base import Failed, Finished, Order, Passed
 from jobs.executors.local import LocalExecutor
 from jobs.gridpoints import check_count, file_of, with_points
-from jobs.gridspec import MAX_PIXELS, MAX_SIDE
+from jobs.gridspec import MAX_PIXELS, MAX_SIDE, Crop
 from renderer import catalog, devices
-from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, SceneError
+from renderer.errors import BadParameter, DartboardError, EnvironmentProblem, SceneError, UnknownName
 from renderer.samplers import pointfile
 from renderer.samplers.pointfile import PointSource
 from renderer.scenes import sources
@@ -32,6 +32,8 @@ def render_one(
     seed: int,
     size: str | None,
     max_depth: int | None,
+    crop: str | None,
+    rfilter: str | None,
     device: str,
 ) -> dict[str, Any]:
     """
@@ -46,7 +48,10 @@ def render_one(
         raise BadParameter(f"cannot write {output.name}: pictures are OpenEXR files; give a name that ends in .exr")
     source = sources.find(scene, Path())
     points = _point_file(sampler)
-    spec = cell(source, integrator=integrator, sampler=sampler, spp=spp, size=size, max_depth=max_depth, points=points)
+    spec = cell(
+        source, integrator=integrator, sampler=sampler, spp=spp, size=size, max_depth=max_depth, crop=crop,
+        rfilter=rfilter, points=points,
+    )  # fmt: skip
     with tempfile.TemporaryDirectory(prefix="dartboard-") as folder:
         out = Path(folder)
         snapshot = sources.snapshot(source, out / "scenes")
@@ -72,7 +77,9 @@ def render_one(
     return {
         "output": str(output), "scene": source.name, "width": width, "height": height,
         "integrator": catalog.label("integrator", spec.integrator), "sampler": catalog.label("sampler", spec.sampler),
-        "max_depth": spec.estimand.max_depth, "spp_actual": spec.spp, "seed": seed, "digest": spec.digest,
+        "max_depth": spec.estimand.max_depth, "crop": spec.estimand.crop,
+        "rfilter": catalog.label("rfilter", spec.estimand.rfilter),
+        "spp_actual": spec.spp, "seed": seed, "digest": spec.digest,
         "render_seconds": finished.render_seconds, "compile_seconds": finished.compile_seconds,
         "device": finished.device,
     }  # fmt: skip
@@ -86,6 +93,8 @@ def cell(
     spp: int | None,
     size: str | None,
     max_depth: int | None,
+    crop: str | None = None,
+    rfilter: str | None = None,
     points: PointSource | None = None,
 ) -> CellSpec:
     """
@@ -107,7 +116,8 @@ def cell(
     depth = entry.depth if entry.depth is not None else int(depth)
     moved = {parameter.name for parameter in entry.parameters if parameter.estimand}
     estimand = Estimand(
-        source.digest, width, height, depth, catalog.resolve("rfilter", "box"),
+        source.digest, width, height, depth, _choice("rfilter", rfilter, defaults.rfilter, source.name),
+        _crop(crop, width, height) if crop else defaults.crop_at(width, height),
         hide_emitters=bool(parameters.get("hide_emitters", False)),
     )  # fmt: skip
     how = Choice(how.name, how.version, tuple(pair for pair in how.parameters if pair[0] not in moved))
@@ -125,9 +135,11 @@ def _choice(axis: str, given: str | None, default: str, scene: str) -> Choice:
         return catalog.resolve(axis, given, f"--{axis}")
     try:
         return catalog.resolve(axis, default)
-    except DartboardError as error:
+    except UnknownName as error:
         raise SceneError(f"the {axis} of the scene {scene!r} is {default!r}, which Dartboard does not offer; "
                          f"choose one with --{axis}: {', '.join(catalog.entries(axis))}") from error  # fmt: skip
+    except DartboardError as error:
+        raise SceneError(f"{error}, as the scene {scene!r} has it; choose one with --{axis}") from error
 
 
 def _depth(given: int) -> int:
@@ -145,6 +157,18 @@ def _size(text: str) -> tuple[int, int]:
             f"at most {MAX_PIXELS}"
         )
     return width, height
+
+
+def _crop(text: str, width: int, height: int) -> Crop | None:
+    """``--crop``; None where it is the whole film."""
+    match = re.fullmatch(r"\s*" + r"\s*,\s*".join([r"(\d{1,6})"] * 4) + r"\s*", text)
+    x, y, wide, high = (int(number) for number in match.groups()) if match else (0, 0, 0, 0)
+    if not wide or not high or x + wide > width or y + high > height:
+        raise BadParameter(
+            f"--crop {text!r} is not allowed; write X,Y,WIDTH,HEIGHT in pixels from the top left, inside the "
+            f"{width}×{height} film"
+        )
+    return None if (x, y, wide, high) == (0, 0, width, height) else (x, y, wide, high)
 
 
 def _draw(executor: LocalExecutor, order: Order) -> Finished:

@@ -71,7 +71,7 @@ class Setup:
     sweeps: list[Sweep]
     samplers: list[Plugin]
     integrators: list[Plugin]
-    rfilter: str
+    rfilter: str  # with the scenes that have another
     colour: str
 
     def sizes(self) -> dict[str, tuple[int, int]]:
@@ -91,8 +91,16 @@ def of(reading: Reading) -> Setup:
         [_sweep(sweep, len(grid["scenes"])) for sweep in grid.get("sweeps", ())],
         [_plugin("sampler", item, grid["spp"]) for item in grid["samplers"]],
         [_plugin("integrator", item, []) for item in grid["integrators"]],
-        label("rfilter", grid["rfilter"]), grid["colour"],
+        _filters(grid), grid["colour"],
     )  # fmt: skip
+
+
+def _filters(grid: Row) -> str:
+    """The filter of the grid, and those of scenes that have another."""
+    common = label("rfilter", grid["rfilter"])
+    own = [(scene["name"], label("rfilter", scene["rfilter"])) for scene in grid["scenes"] if "rfilter" in scene]
+    others = [f"{rfilter} in {name}" for name, rfilter in own if rfilter != common]
+    return ", ".join([common, *others])
 
 
 def _plugin(axis: str, item: Row, spp: list[int]) -> Plugin:

@@ -37,6 +37,7 @@ settings_of_a_scene = {
     "resolution": st.tuples(st.integers(9, 500), st.integers(9, 500)).map(list),
     "crop": st.tuples(*[st.integers(0, 4)] * 2, *[st.integers(1, 5)] * 2).map(list),
     "max_depth": st.sampled_from([-1, 1, 2, 6, 10.0]),
+    "rfilter": st.sampled_from(["box", "tent", {"type": "gaussian", "stddev": 0.4}]),
     "reference": references,
 }
 
@@ -57,7 +58,6 @@ def tables():
                 "integrators": some(INTEGRATORS),
                 "spp": st.integers(1, 99) | st.lists(st.integers(1, 99), min_size=1, max_size=6),
                 "replicates": st.integers(1, 50),
-                "rfilter": st.sampled_from(["box", "tent", {"type": "gaussian", "stddev": 0.4}]),
                 "colour": st.sampled_from(["rgb", "spectral"]),
                 **settings_of_a_scene,
             },

@@ -15,8 +15,9 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from jobs import grid
+from jobs import grid, plan
 from jobs.errors import GridError
+from renderer import catalog
 from renderer.errors import DartboardError
 from renderer.scenes import builtin, sources
 from renderer.scenes.defaults import SceneDefaults
@@ -53,6 +54,40 @@ def test_a_grid_needs_only_a_scene():
 def test_what_nobody_says_is_the_scene_files(imaginary_scene):
     scene = parse().scenes[0]
     assert (scene.width, scene.height, scene.crop, scene.max_depth) == (200, 100, None, 8)
+
+
+def test_crop_and_filter_are_the_scene_files_where_nobody_speaks(monkeypatch, caplog):
+    """The nearest counts; the whole film can be said; a filter that mixes pixels is told, once it holds."""
+    defaults = SceneDefaults(width=200, height=100, crop=(20, 10, 100, 50), rfilter="gaussian")
+    source = SceneSource("room.xml", ROOT, "room.xml", (), "0" * 64, False, defaults)
+    builtin_find = sources.find
+    monkeypatch.setattr(sources, "find", lambda name, base: source if name == "room.xml" else builtin_find(name, base))
+
+    def of_the_room(**keys):
+        spec = parse(scenes=["cornell_box", "room.xml"], **keys)
+        assert spec.scenes[0].rfilter.name == keys.get("rfilter", "box")
+        return spec.scenes[1].crop, catalog.label("rfilter", spec.scenes[1].rfilter)
+
+    assert of_the_room(rfilter="box") == ((20, 10, 100, 50), "box")
+    assert of_the_room(scene={"room": {"rfilter": "tent"}}) == ((20, 10, 100, 50), "tent")
+    assert not caplog.records
+    assert of_the_room() == ((20, 10, 100, 50), "gaussian")
+    assert ["room.xml has the filter gaussian" in told for told in caplog.messages] == [True]
+    assert of_the_room(resolution=[100, 50]) == ((10, 5, 50, 25), "gaussian")
+    assert of_the_room(crop=[1, 2, 3, 4]) == ((1, 2, 3, 4), "gaussian")
+    assert of_the_room(crop=[0, 0, 200, 100], resolution=[200, 100]) == (None, "gaussian")
+    plans = [plan.expand(parse(scenes=["room.xml"], **keys)).cells[0].spec for keys in ({}, {"rfilter": "tent"})]
+    assert [spec.estimand.rfilter.name for spec in plans] == ["gaussian", "tent"]
+
+
+def test_a_scene_files_bad_crop_and_filter_are_told(monkeypatch):
+    defaults = SceneDefaults(width=20, height=10, crop=(-1, 0, 5, 5), rfilter="gaussian:stddev=9")
+    source = SceneSource("s", ROOT, "s.xml", (), "0" * 64, False, defaults)
+    monkeypatch.setattr(sources, "find", lambda name, base: source)
+    crop, rfilter = complaints()
+    assert "scenes[0] of grid.toml: the crop of the file is [-1, 0, 5, 5], outside the 20×10 film" in crop
+    assert "stddev = 9 of rfilter 'gaussian' in scenes[0] of grid.toml is not allowed" in rfilter
+    assert complaints(crop=[0, 0, 5, 5], rfilter="box") == ()
 
 
 def test_the_name_is_the_files_unless_said(tmp_path):

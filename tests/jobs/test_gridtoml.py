@@ -16,6 +16,7 @@ from jobs.errors import GridError
 from jobs.gridspec import GridSpec
 from renderer.errors import DartboardError
 from renderer.scenes import sources
+from renderer.scenes.defaults import SceneDefaults
 from tests.jobs.grids import HERE, parse, settings_of_a_scene, tables
 
 FIND = partial(sources.find, base=HERE)
@@ -112,6 +113,30 @@ def test_a_scene_that_shows_the_whole_film_beside_one_with_a_crop():
     spec = parse(scenes=["cornell_box", "defocus"], resolution=[20, 20],
                  scene={"cornell_box": {"crop": [1, 1, 5, 5]}})  # fmt: skip
     assert [scene.crop for scene in read_back(toml_of(spec)).scenes] == [(1, 1, 5, 5), None]
+
+
+@pytest.mark.parametrize("order", [("cornell_box", "room"), ("room", "cornell_box"), ("room",)])
+@pytest.mark.parametrize(
+    "keys",
+    [
+        {},
+        {"rfilter": "box"},
+        {"crop": [0, 0, 256, 256]},
+        {"rfilter": "tent", "crop": [1, 1, 2, 2]},
+        {"scene": {"room": {"rfilter": "box", "crop": [0, 0, 256, 256]}}},
+    ],
+)
+def test_what_a_file_would_say_is_overruled_again(order, keys):
+    """A scene file with a crop and a filter: the text gives the same grid, though the file would say another."""
+    own = SceneDefaults(crop=(8, 8, 16, 16), rfilter="gaussian")
+    room = replace(FIND("defocus"), name="room", defaults=own)
+
+    def find(name):
+        return room if name == "room" else FIND(name)
+
+    spec = grid.parse({"name": "n", "scenes": list(order), **keys}, find=find, origin="a grid")
+    again = read_back(toml_of(spec), find)
+    assert again.scenes == spec.scenes and again.digest == spec.digest, toml_of(spec)
 
 
 @pytest.mark.parametrize("character", [chr(code) for code in (0x00, 0x08, 0x0A, 0x1F, 0x7F, 0x85, 0x2028, 0xFEFF)])

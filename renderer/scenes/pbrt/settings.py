@@ -1,17 +1,19 @@
 """
-What a pbrt file says about its rendering, as the XML from which a cell takes its defaults: Film, PixelFilter, Sampler
-and Integrator. Names that the catalog does not offer are replaced, and reported.
+What a pbrt file says about its rendering, as the XML from which a cell takes its defaults: Film, Sampler and Integrator
+(PixelFilter: filters.py). Names that the catalog does not offer are replaced, and reported.
 
-Source: pbrt-v3, src/samplers, src/integrators, src/filters (defaults); a student report's Poisson-disk samplers, whose
-parameters are numPoints and minDist.
+Source: pbrt-v3, src/core/film.cpp, src/samplers, src/integrators (defaults); a student report's Poisson-disk
+samplers, whose parameters are numPoints and minDist.
 """
 
 from __future__ import annotations
 
+import math
+
 from renderer import catalog
 from renderer.errors import DartboardError, SceneError, shown
-from renderer.scenes.pbrt import xml
-from renderer.scenes.pbrt.parameters import Parameters
+from renderer.scenes.pbrt import filters, xml
+from renderer.scenes.pbrt.parameters import Floats, Parameters
 from renderer.scenes.pbrt.report import Report
 from renderer.scenes.pbrt.xml import Xml
 from renderer.spec import Scalar
@@ -37,35 +39,31 @@ def film_size(given: Parameters | None) -> tuple[int, int]:
 
 
 def film(given: Parameters | None, rfilter: tuple[str, Parameters] | None, report: Report) -> Xml:
-    """The film: its size and filter. Its crop window is told, as cells are cropped by their grid."""
+    """The film: its size, crop window and filter. Raises ``SceneError`` for a window without a pixel."""
     width, height = film_size(given)
-    size = [xml.value("integer", "width", width), xml.value("integer", "height", height)]
+    parts = [xml.value("integer", "width", width), xml.value("integer", "height", height)]
     if given is not None:
         given.ignore("filename", "diagonal")
         if given.number("scale", 1) != 1:
             report.note(given.place, "the film's scale is left out: pictures are radiance")
         window = given.array("cropwindow", 4, "float")
-        if window is not None and tuple(window[0]) != (0, 1, 0, 1):
-            x0, x1, y0, y1 = window[0].clip(0, 1)
-            x, y = -int(-x0 * width // 1), -int(-y0 * height // 1)
-            right, bottom = -int(-x1 * width // 1), -int(-y1 * height // 1)
-            report.note(
-                given.place, "a scene has no crop window of its own: the whole film is drawn, unless the grid says "
-                f"crop = [{x}, {y}, {right - x}, {bottom - y}] (with resolution = [{width}, {height}])"
-            )  # fmt: skip
-    return xml.plugin("film", "hdrfilm", *size, _rfilter(rfilter, report))
+        if window is not None:
+            (x, wide), (y, high) = _pixels(window[0, :2], width), _pixels(window[0, 2:], height)
+            if not wide or not high:
+                raise SceneError(
+                    f"{given.place}: the cropwindow holds no pixel; give x0 x1 y0 y1, fractions of the film from 0 to 1"
+                )
+            if (x, y, wide, high) != (0, 0, width, height):
+                crop = {"crop_offset_x": x, "crop_offset_y": y, "crop_width": wide, "crop_height": high}
+                parts += [xml.value("integer", name, pixels) for name, pixels in crop.items()]
+    drawn = filters.rfilter(*rfilter, report) if rfilter else xml.plugin("rfilter", "box")
+    return xml.plugin("film", "hdrfilm", *parts, drawn)
 
 
-def _rfilter(given: tuple[str, Parameters] | None, report: Report) -> Xml:
-    kind, parameters = given if given else ("box", None)
-    if parameters is not None:
-        parameters.ignore(*parameters.items)
-        widths = parameters.number("xwidth", 0.5), parameters.number("ywidth", 0.5)
-        if kind != "box" or widths != (0.5, 0.5):
-            report.note(parameters.place, f"the pixel filter {shown(kind)} is left out: a cell has the filter of its "
-                        "grid, and box where the grid says nothing")  # fmt: skip
-    names = {"gaussian": "gaussian", "mitchell": "mitchell", "sinc": "lanczos", "triangle": "tent"}
-    return xml.plugin("rfilter", names.get(kind, "box"))
+def _pixels(window: Floats, side: int) -> tuple[int, int]:
+    """The first pixel and the number of pixels between two fractions of a side, rounded as pbrt does."""
+    start, end = (math.ceil(fraction * side) for fraction in sorted(window.clip(0, 1).tolist()))
+    return start, end - start
 
 
 def sampler(kind: str, given: Parameters, report: Report) -> Xml:

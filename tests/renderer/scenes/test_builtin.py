@@ -68,6 +68,7 @@ def test_scenes_are_256_square_at_depth_6() -> None:
         defaults = find(name, Path()).defaults
         depth = 10 if name.startswith("glass_") else 6
         assert (defaults.width, defaults.height, defaults.max_depth, defaults.integrator) == (256, 256, depth, "path")
+        assert (defaults.crop, defaults.rfilter) == (None, "box")
 
 
 @pytest.mark.parametrize("variant", ["llvm_ad_rgb", "llvm_ad_spectral"])

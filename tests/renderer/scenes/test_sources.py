@@ -160,6 +160,29 @@ def test_defaults_are_what_the_file_says(write: Write) -> None:
     assert find(str(write("")), Path("/")).defaults == SceneDefaults(256, 256, 6, "path", "independent", 16)
 
 
+def test_crop_and_filter_are_what_the_file_says(write: Write) -> None:
+    """Box where it is silent, whatever Mitsuba has by default; a crop without a width is as wide as the film."""
+    film = """<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="100"/>
+        <integer name="height" value="50"/>{}</film></sensor>"""
+    defaults = find(str(write(film.format(""))), Path("/")).defaults
+    assert (defaults.crop, defaults.rfilter) == (None, "box")
+    said = (
+        '<integer name="crop_offset_x" value="10"/><integer name="crop_width" value="25"/>'
+        '<rfilter type="gaussian"><float name="stddev" value="0.4"/></rfilter>'
+    )
+    defaults = find(str(write(film.format(said))), Path("/")).defaults
+    assert (defaults.crop, defaults.rfilter) == ((10, 0, 25, 50), "gaussian:stddev=0.4")
+
+
+@pytest.mark.parametrize(
+    ("size", "crop"),
+    [((100, 50), (10, 0, 25, 50)), ((200, 100), (20, 0, 50, 100)), ((30, 50), (3, 0, 8, 50)), ((1, 1), (0, 0, 1, 1))],
+)
+def test_a_crop_stays_the_same_part_of_the_picture(size: tuple[int, int], crop: tuple[int, ...]) -> None:
+    """In a film of another size; never less than a pixel, never outside."""
+    assert SceneDefaults(100, 50, crop=(10, 0, 25, 50)).crop_at(*size) == crop
+
+
 def test_a_snapshot_is_the_scene_and_nothing_else(folder: Path, tmp_path: Path) -> None:
     """Named by its digest, found again as the same scene, made once."""
     (folder / "README.md").write_text("notes")

@@ -77,8 +77,57 @@ def test_film_and_depth_are_defaults(scenes: Scenes) -> None:
     )
     source = scenes("", options=options)
     assert (source.defaults.width, source.defaults.height, source.defaults.integrator) == (100, 50, "direct")
-    assert any("crop = [0, 10, 50, 40]" in note for note in source.notes)
+    assert (source.defaults.crop, source.notes) == ((0, 10, 50, 40), ())
+    assert scenes("", options='Film "image" "float cropwindow" [0 1 0 1]').defaults.crop is None
     assert scenes("", options='Integrator "path" "integer maxdepth" 0').defaults.max_depth == 1
+
+
+@pytest.mark.parametrize(
+    ("line", "rfilter", "words"),
+    [
+        ("box", "box", ""),
+        ('box" "float xwidth" 1 "float ywidth" 1', "box", "ends 0.5 pixels from its centre here, not 1"),
+        ("triangle", "tent:radius=2", ""),
+        ('triangle" "float xwidth" 1.5 "float ywidth" 3', "tent:radius=1.5", "ywidth = 3 is left out"),
+        ("gaussian", "gaussian", ""),
+        ('gaussian" "float alpha" 8 "float xwidth" 1 "float ywidth" 1', "gaussian:stddev=0.25", ""),
+        ('gaussian" "float xwidth" 3 "float ywidth" 3', "gaussian", "ends 2 pixels from its centre here, not 3"),
+        ('mitchell" "float B" 0 "float C" .5', "mitchell:B=0,C=0.5", ""),
+        ('mitchell" "float C" 2', "box", "C = 2"),
+        ('sinc" "float xwidth" 3 "float ywidth" 3', "lanczos", ""),
+        ('sinc" "float tau" 3.5', "lanczos:lobes=4", "tau = 4 here, not 3.5"),
+        ("magic", "box", "'magic' is unknown"),
+        ('box" "float width" 1', "box", "no parameter of PixelFilter"),
+    ],
+)  # fmt: skip
+def test_filters_are_defaults(scenes: Scenes, line: str, rfilter: str, words: str) -> None:
+    """The filter that a cell has; what cannot be matched is said by line."""
+    text = line if '"' in line else line + '"'
+    source = scenes("", options=f'{CAMERA}{FILM}PixelFilter "{text}')
+    assert source.defaults.rfilter == rfilter
+    assert all(words in note and "line 4" in note for note in source.notes) and bool(source.notes) == bool(words)
+
+
+# Of pbrt-v3's src/filters, along one axis and for its defaults, but the sinc's, which is Mitsuba's where τ is the radius.
+ALONG = {
+    "triangle": lambda x: np.maximum(0, 2 - x),
+    "gaussian": lambda x: np.maximum(0, np.exp(-2 * x**2) - np.exp(-8)),
+    "mitchell": lambda x: np.where(x > 1, -7 / 18 * x**3 + 2 * x**2 - 10 / 3 * x + 16 / 9, 7 / 6 * x**3 - 2 * x**2 + 8 / 9),
+    'sinc" "float xwidth" 3 "float ywidth" 3 "float tau" 3': lambda x: np.sinc(x) * np.sinc(x / 3),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ALONG)
+def test_filters_are_the_same_functions(scenes: Scenes, variant: str, kind: str) -> None:
+    import mitsuba as mi
+
+    from renderer import catalog
+
+    text = kind if '"' in kind else kind + '" "float xwidth" 2'
+    choice = catalog.resolve("rfilter", scenes("", options=f'PixelFilter "{text}').defaults.rfilter)
+    x = np.linspace(0, 1.99, 50)
+    found = np.array(mi.load_dict({"type": choice.name, **dict(choice.parameters)}).eval(mi.Float(x)))
+    assert found / found[0] == pytest.approx(ALONG[kind](x) / ALONG[kind](0 * x)[0], abs=2e-3)
 
 
 BAD = {
@@ -137,6 +186,8 @@ def test_bad_input_is_one_sentence_with_its_line(scenes: Scenes, case: str) -> N
         ("WorldBegin".encode("utf-16"), "is not UTF-8"),
         (b"WorldBegin\n\0", "line 2: the file holds zero bytes"),
         (b'Camera "realistic"\nWorldBegin WorldEnd', "line 1: the camera 'realistic' is not supported"),
+        (b'Film "image" "float cropwindow" [.5 .5 0 1]\nWorldBegin WorldEnd', "line 1: the cropwindow holds no pixel"),
+        (b'PixelFilter "gaussian" "float alpha" 0\nWorldBegin WorldEnd', "line 1: alpha = 0 of PixelFilter"),
         (b'Scale 1 2 1\nCamera "perspective"\nWorldBegin WorldEnd', "line 2: the transform of the camera stretches"),
     ],
 )
