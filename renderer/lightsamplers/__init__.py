@@ -18,7 +18,7 @@ from renderer.errors import UnknownName
 if TYPE_CHECKING:
     from renderer.lightsamplers.base import LightSampler
 
-NAMES = ("uniform", "power")
+NAMES = ("uniform", "power", "spatial")
 
 
 def make(name: str, scene: Any) -> LightSampler:
@@ -31,9 +31,10 @@ def make(name: str, scene: Any) -> LightSampler:
         raise UnknownName("light sampler", name, "", NAMES)
     from renderer.lightsamplers.base import Darkness
     from renderer.lightsamplers.power import Power
+    from renderer.lightsamplers.spatial import Spatial
     from renderer.lightsamplers.uniform import Uniform
 
     if not scene.emitters():
         return Darkness(scene)
-    kinds: dict[str, type[LightSampler]] = {"uniform": Uniform, "power": Power}
+    kinds: dict[str, type[LightSampler]] = {"uniform": Uniform, "power": Power, "spatial": Spatial}
     return kinds[name](scene)

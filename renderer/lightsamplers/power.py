@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.lightsamplers.base import LightSampler, floats_on_device, radical_inverses
-from renderer.lightsamplers.rows import Rows
+from renderer.lightsamplers.rows import Rows, running_sums
 
 POINTS = 1024  # rays a lamp; RGB lamps in a spectral variant scatter by 10 % about the mean, a spot's edge by 60 %
 CHUNK = 2**22  # lanes at once
@@ -31,7 +31,7 @@ class Power(LightSampler):
 
     def __init__(self, scene: Any):
         super().__init__(scene)
-        self._rows = Rows(power_pmf(scene)[None])
+        self._rows = Rows(running_sums(power_pmf(scene)[None]))
 
     def pick(self, p: Any, n: Any, u: Any, active: Any = True) -> tuple[Any, Any, Any]:
         return self._rows.pick(mi.UInt32(0), u, active)

@@ -22,17 +22,16 @@ UNITS = 2**23
 
 class Rows:
     """
-    ``columns`` lamps a row. The table has columns + 1 entries a row, from 0 to 1.
+    ``columns`` lamps a row. The table has columns + 1 entries a row, from 0 to 1, as ``running_sums`` makes them.
 
     Not a Dr.Jit structure, so that loops leave it alone.
     """
 
     __slots__ = ("columns", "sums")
 
-    def __init__(self, weights: NDArray[np.floating[Any]]):
-        """``weights``, shape (rows, columns): finite, ≥ 0, in any unit; a row of zeros becomes uniform."""
-        self.columns = weights.shape[1]
-        self.sums = floats_on_device(running_sums(weights))
+    def __init__(self, sums: NDArray[np.float32]):
+        self.columns = sums.shape[1] - 1
+        self.sums = floats_on_device(sums)
 
     def pick(self, row: Any, u: Any, active: Any = True) -> tuple[Any, Any, Any]:
         """The lamp of ``row`` whose interval holds ``u`` → (number, probability, u stretched to [0, 1) again)."""
@@ -53,7 +52,11 @@ class Rows:
 
 
 def running_sums(weights: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
-    """The table of ``weights``, shape (rows, columns + 1): multiples of 2⁻²³ that grow from 0 to 1."""
+    """
+    The table of ``weights``, shape (rows, columns): finite, ≥ 0, in any unit; a row of zeros becomes uniform.
+
+    Multiples of 2⁻²³ that grow from 0 to 1 along each row, shape (rows, columns + 1).
+    """
     rows, columns = weights.shape
     if columns > UNITS // 2:
         raise ValueError(f"{columns} lamps; a distribution holds at most {UNITS // 2}")
