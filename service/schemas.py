@@ -109,6 +109,9 @@ class Scene(Wire):
     sampler: str
     spp: int
     files: list[str]
+    notes: list[str] = Field(
+        default=[], description="of a pbrt file, in the answer to its upload: what was replaced or ignored, by line"
+    )
 
 
 class SceneParameter(Wire):

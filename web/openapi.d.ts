@@ -440,8 +440,9 @@ export interface paths {
         put?: never;
         /**
          * Upload
-         * @description Upload a scene: a zip of its folder, at most 256 MiB. It is vetted (only plugins that ship with Mitsuba, only files
-         *     of its own folder) and kept by its digest; a submission then says `"scenes": {NAME: digest}`.
+         * @description Upload a scene: a zip of its folder, at most 256 MiB; a pbrt-v3 one is converted, and the answer's `notes` say what
+         *     is not as in its file. It is vetted (only plugins that ship with Mitsuba, only files of its own folder) and kept
+         *     by its digest; a submission then says `"scenes": {NAME: digest}`.
          */
         post: operations["upload_api_scenes_post"];
         delete?: never;
@@ -999,6 +1000,12 @@ export interface components {
             spp: number;
             /** Files */
             files: string[];
+            /**
+             * Notes
+             * @description of a pbrt file, in the answer to its upload: what was replaced or ignored, by line
+             * @default []
+             */
+            notes: string[];
         };
         /**
          * SceneInfo
@@ -3748,7 +3755,7 @@ export interface operations {
             query: {
                 /** @description what grids will call it */
                 name: string;
-                /** @description its XML file, where the folder has several */
+                /** @description its scene file, where the folder has several */
                 main?: string | null;
             };
             header?: never;

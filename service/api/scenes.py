@@ -41,11 +41,14 @@ async def upload(
     request: Request,
     engine: EngineDep,
     name: Annotated[str, Query(min_length=1, max_length=200, description="what grids will call it")],
-    main: Annotated[str | None, Query(max_length=200, description="its XML file, where the folder has several")] = None,
+    main: Annotated[
+        str | None, Query(max_length=200, description="its scene file, where the folder has several")
+    ] = None,
 ) -> schemas.Scene:
     """
-    Upload a scene: a zip of its folder, at most 256 MiB. It is vetted (only plugins that ship with Mitsuba, only files
-    of its own folder) and kept by its digest; a submission then says `"scenes": {NAME: digest}`.
+    Upload a scene: a zip of its folder, at most 256 MiB; a pbrt-v3 one is converted, and the answer's `notes` say what
+    is not as in its file. It is vetted (only plugins that ship with Mitsuba, only files of its own folder) and kept
+    by its digest; a submission then says `"scenes": {NAME: digest}`.
     """
     what = f"the archive of {shown(name)}"
     with await bodies.save(request, bodies.SCENE_BYTES, what, engine.artifacts.data) as archive:
@@ -77,5 +80,5 @@ def _scene(source: SceneSource) -> schemas.Scene:
     return schemas.Scene(
         name=source.name, digest=source.digest, builtin=source.builtin, main=source.main, width=said.width,
         height=said.height, max_depth=said.max_depth, integrator=said.integrator, sampler=said.sampler, spp=said.spp,
-        files=[file.path for file in source.files],
+        files=[file.path for file in source.files], notes=list(source.notes),
     )  # fmt: skip

@@ -107,6 +107,48 @@ def test_the_same_folder_is_the_same_scene_however_it_was_packed(house: House) -
     assert plain.digest == wrapped.digest
 
 
+PBRT = """Film "image" "integer xresolution" 12 "integer yresolution" 8 "float cropwindow" [0 .5 0 1]
+Sampler "stratified" "integer xsamples" 2 "integer ysamples" 3
+WorldBegin
+Include "parts/lamp.pbrt"
+Material "plastic"
+Shape "plymesh" "string filename" "parts/a.ply"
+WorldEnd
+"""
+PBRT_FILES = {
+    "parts/lamp.pbrt": 'LightSource "infinite" "rgb L" [1 1 1]\n',
+    "parts/a.ply": b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+    b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 3\n1 0 3\n0 1 3\n3 0 1 2\n",
+}
+
+
+def test_a_pbrt_file_arrives_as_the_scene_that_is_made_of_it(house: House) -> None:
+    """With its includes and meshes; its settings are the scene's, what was replaced is said, and a grid may name it."""
+    content = packed({"room/scene.pbrt": PBRT, **{f"room/{name}": part for name, part in PBRT_FILES.items()}})
+    scene = answer(upload(house, content), schemas.Scene)
+    assert (scene.name, scene.main, scene.files) == ("room", "scene.xml", ["meshes/00001.ply", "scene.xml"])
+    assert (scene.width, scene.height, scene.sampler, scene.spp, scene.max_depth) == (12, 8, "stratified", 6, 6)
+    assert ["scene.pbrt, line 5" in note and "plastic" in note for note in scene.notes] == [True]
+    grid = {"scenes": ["room"], "spp": [1], "reference": False}
+    body = {"grid": grid, "scenes": {"room": scene.digest}}
+    submitted = answer(house.client.post("/api/experiments", json=body), schemas.Experiment)
+    told = house.client.get(f"/api/experiments/{submitted.id}").json()
+    assert [(one["name"], one["width"], one["height"]) for one in told["scenes"]] == [("room", 6, 8)]
+
+
+def test_a_pbrt_archive_that_cannot_be_read_is_one_sentence(house: House) -> None:
+    """With the file and the line, no path of this machine, and nothing kept."""
+    for files, words in (
+        ({"scene.pbrt": PBRT.replace("Shape", "Shpae"), **PBRT_FILES}, "scene.pbrt, line 6: unknown directive 'Shpae'"),
+        ({"scene.pbrt": PBRT, "parts/lamp.pbrt": 'Include "../scene.pbrt"'}, "line 1"),
+        ({"scene.pbrt": PBRT, "parts/lamp.pbrt": 'Include "/etc/passwd"'}, "parts/lamp.pbrt, line 1"),
+        ({"a.pbrt": PBRT, "b.pbrt": PBRT}, "the 2 files a.pbrt, b.pbrt"),
+    ):
+        told = refusal(upload(house, packed(files)), 422, "bad-scene").detail
+        assert words in told and str(house.artifacts.data) not in told and "\n" not in told
+    assert not left_behind(house)
+
+
 def test_the_main_file_may_be_named(house: House) -> None:
     both = packed({"day.xml": SCENE, "night.xml": SCENE.replace("12", "16")})
     assert "2 files day.xml, night.xml" in refusal(upload(house, both), 422, "bad-scene").detail

@@ -19,14 +19,13 @@ import numpy as np
 from renderer.errors import SceneError, UnknownName, shown
 from renderer.scenes.pbrt import camera, settings, transforms, xml
 from renderer.scenes.pbrt.lexer import Place
-from renderer.scenes.pbrt.lights import LightReader
+from renderer.scenes.pbrt.lights import Lamp, LightReader
 from renderer.scenes.pbrt.materials import OVERRIDES, Material, MaterialWriter, Surface
 from renderer.scenes.pbrt.output import Output
 from renderer.scenes.pbrt.parameters import Parameters
 from renderer.scenes.pbrt.parser import NUMERIC, Directive, Folder, directives
 from renderer.scenes.pbrt.report import Report
 from renderer.scenes.pbrt.shapes import ShapeMaker
-from renderer.scenes.pbrt.spectra import Rgb
 from renderer.scenes.pbrt.textures import Reader, Texture
 from renderer.scenes.pbrt.texturexml import TextureWriter
 from renderer.scenes.pbrt.transforms import IDENTITY, Matrix
@@ -63,7 +62,7 @@ class _State:
     matrix: Matrix
     material: Material
     reverse: bool = False
-    lamp: tuple[Rgb, Parameters] | None = None
+    lamp: Lamp | None = None
     floats: Mapping[str, Texture] = field(default_factory=dict)
     spectra: Mapping[str, Texture] = field(default_factory=dict)
     materials: Mapping[str, Material] = field(default_factory=dict)
@@ -292,7 +291,7 @@ class _Machine:
     def area_light(self, directive: Directive) -> None:
         self.need_world(directive)
         given = directive.parameters
-        self.state = replace(self.state, lamp=(self.lights.area(directive.words[0], given), given))
+        self.state = replace(self.state, lamp=self.lights.area(directive.words[0], given))
         self.unknown(given)
 
     def light(self, directive: Directive) -> None:
@@ -318,30 +317,32 @@ class _Machine:
         if lamp is not None and self.group is not None:
             self.report.note(directive.place, "a lamp inside an object does not shine, as in pbrt-v3")
             lamp = None
-        made = self.shapes.make(
-            directive.words[0], given, state.matrix, reverse=state.reverse, uses_uv=surface.uses_uv or "alpha" in given,
-            lamp=lamp is not None, group=self.group is not None,
-        )  # fmt: skip
-        if made is None:
-            return
         reader = Reader(self.folder, self.report, state.floats, state.spectra)
         alpha = reader.value(given, "alpha", None, 1)
         if "shadowalpha" in given:
             self.report.note(directive.place, "shadowalpha is left out: what is transparent casts no shadow")
             given.ignore("shadowalpha")
-        upside_down = made.upside_down and surface.textured
-        if own:
-            part = self.writer.write(material, bsdf, state.materials, upside_down=upside_down).bsdf
-        else:
-            part = xml.reference(self.shared(material, surface, upside_down))
-        if alpha is not None:
-            cut = self.textures.write(alpha, "opacity", upside_down=made.upside_down)
-            part = xml.plugin("bsdf", "mask", cut, part)
-        made.shape.set("id", self.identity(f"{xml.word(directive.words[0])}_{directive.place.line}"))
-        made.shape.append(part)
-        if lamp is not None and lamp[0].any():
-            made.shape.append(xml.plugin("emitter", "area", xml.rgb("radiance", lamp[0])))
-        (self.body if self.group is None else self.group).append(made.shape)
+        shines = lamp is not None and bool(lamp.radiance.any())
+        for back in (False, True) if lamp and shines and lamp.twosided else (False,):
+            made = self.shapes.make(
+                directive.words[0], given, state.matrix, reverse=state.reverse, lamp=lamp is not None, back=back,
+                uses_uv=surface.uses_uv or "alpha" in given, group=self.group is not None,
+            )  # fmt: skip
+            if made is None:
+                return
+            upside_down = made.upside_down and surface.textured
+            if own:
+                part = self.writer.write(material, bsdf, state.materials, upside_down=upside_down).bsdf
+            else:
+                part = xml.reference(self.shared(material, surface, upside_down))
+            if alpha is not None:
+                cut = self.textures.write(alpha, "opacity", upside_down=made.upside_down)
+                part = xml.plugin("bsdf", "mask", cut, part)
+            made.shape.set("id", self.identity(f"{xml.word(directive.words[0])}_{directive.place.line}"))
+            made.shape.append(part)
+            if lamp and shines:
+                made.shape.append(xml.plugin("emitter", "area", xml.rgb("radiance", lamp.radiance)))
+            (self.body if self.group is None else self.group).append(made.shape)
         if own:
             given.ignore(*OVERRIDES)
         self.unknown(given)

@@ -6,6 +6,8 @@ Source: pbrt-v3, src/lights.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from renderer.errors import shown
@@ -21,6 +23,19 @@ from renderer.scenes.pbrt.xml import Xml
 ENVIRONMENT: Matrix = np.array([[0, 0, -1, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
 
 
+@dataclass(frozen=True, eq=False)
+class Lamp:
+    """
+    What makes shapes shine.
+
+    radiance  linear RGB
+    twosided  True: to both sides; False: to that of the normal
+    """
+
+    radiance: spectra.Rgb
+    twosided: bool
+
+
 class LightReader:
     """Makes emitters of ``LightSource`` and ``AreaLightSource``."""
 
@@ -29,14 +44,12 @@ class LightReader:
         self.report = report
         self.output = output
 
-    def area(self, kind: str, given: Parameters) -> spectra.Rgb:
-        """The radiance of an area light. Emits on the side of the normal only, as Mitsuba's ``area`` does."""
+    def area(self, kind: str, given: Parameters) -> Lamp:
+        """What an area light makes of shapes."""
         if kind not in ("diffuse", "area"):
             self.report.lacks(given.place, f"the area light {shown(kind)} is not supported; there is diffuse")
-        if given.flag("twosided", False):
-            self.report.note(given.place, "a two-sided area light shines to one side here, that of its normal")
         given.ignore("samples", "nsamples")
-        return self._colour(given, "L", 1.0)
+        return Lamp(self._colour(given, "L", 1.0), given.flag("twosided", False))
 
     def source(self, kind: str, given: Parameters, to_world: Matrix) -> Xml | None:
         """The emitter of a ``LightSource``; None (and an error in the report) for a kind that we lack."""

@@ -24,6 +24,8 @@ Integers = NDArray[np.int64]
 
 VERTICES_MAX = 2 * 10**7  # of all meshes of a scene
 FACES_MAX = 4 * 10**7
+GAP = 1e-3  # between the two sides of a lamp, of its size: seen by nobody, and safe from rounding
+GAP_LEAST = 1e-5  # the same, of the largest coordinate, for small lamps far from the origin
 CORNERS = np.array([[0, 0], [1, 0], [1, 1.0]])  # u and v of a triangle that has none, in pbrt
 
 
@@ -88,6 +90,22 @@ def placed(mesh: Mesh, matrix: Matrix, reverse: bool, *, own_normals: bool) -> M
         normals = -normals
     faces = mesh.faces[:, ::-1] if transforms.swaps(matrix) != reverse else mesh.faces
     return Mesh(vertices, faces, normals, mesh.uv)
+
+
+def other_side(mesh: Mesh) -> Mesh:
+    """The back of a mesh as a mesh that looks the other way, set back by a hair so that no ray confuses the two."""
+    corners = mesh.vertices[mesh.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    ahead = np.zeros_like(mesh.vertices)
+    np.add.at(ahead, mesh.faces.ravel(), np.repeat(across, 3, axis=0))
+    length = np.linalg.norm(ahead, axis=1, keepdims=True)
+    ahead = np.divide(ahead, length, out=np.zeros_like(ahead), where=length > 0)
+    normals = None if mesh.normals is None else -mesh.normals
+    gap = 0.0
+    if len(mesh.vertices):
+        size = float(np.linalg.norm(np.ptp(mesh.vertices, axis=0)))
+        gap = max(GAP * size, GAP_LEAST * float(np.abs(mesh.vertices).max()))
+    return Mesh(mesh.vertices - gap * ahead, mesh.faces[:, ::-1], normals, mesh.uv)
 
 
 def with_uv(mesh: Mesh) -> Mesh:

@@ -48,12 +48,22 @@ class ShapeMaker:
         self.budget = meshes.Budget()
 
     def make(
-        self, kind: str, given: Parameters, matrix: Matrix, *, reverse: bool, uses_uv: bool, lamp: bool, group: bool
+        self,
+        kind: str,
+        given: Parameters,
+        matrix: Matrix,
+        *,
+        reverse: bool,
+        uses_uv: bool,
+        lamp: bool,
+        group: bool,
+        back: bool = False,
     ) -> Shape | None:
         """
         A shape. None, and an error in the report, for a kind that we lack.
 
         uses_uv  u, v and the tangent matter; lamp  it emits; group  it is part of an object that is instanced
+        back     the other side of it, set back by a hair: Mitsuba's lamps shine to one side
         """
         if kind in QUADRICS:
             if lamp and transforms.swaps(matrix):
@@ -61,17 +71,18 @@ class ShapeMaker:
                     given.place, f"a {kind} that emits under a mirroring transform shines to the side to which its "
                     "normal is mirrored; pbrt-v3 disagrees with itself there"
                 )  # fmt: skip
-            return self._quadric(kind, given, matrix, reverse, uses_uv, group)
+            return self._quadric(kind, given, matrix, reverse, uses_uv, group, back)
         if kind in ("trianglemesh", "plymesh", "heightfield"):
             mesh, own_normals = self._mesh(kind, given)
             mesh = meshes.with_uv(mesh) if uses_uv and kind != "heightfield" else mesh
-            return self._written(meshes.placed(mesh, matrix, reverse, own_normals=own_normals), given.place)
+            return self._written(meshes.placed(mesh, matrix, reverse, own_normals=own_normals), given.place, back)
         told = "is not supported" if kind in UNSUPPORTED else "is unknown"
         self.report.lacks(given.place, f"the shape {shown(kind)} {told}; make it a trianglemesh or plymesh")
         given.ignore(*given.items)
         return None
 
-    def _written(self, mesh: Mesh, place: Place) -> Shape:
+    def _written(self, mesh: Mesh, place: Place, back: bool) -> Shape:
+        mesh = meshes.other_side(mesh) if back else mesh
         path, name = self.output.new("meshes", ".ply", place)
         meshes.write(mesh, path)
         return Shape(
@@ -121,7 +132,7 @@ class ShapeMaker:
         return Mesh(np.concatenate([uv, heights], axis=1), faces, None, uv)
 
     def _quadric(
-        self, kind: str, given: Parameters, matrix: Matrix, reverse: bool, uses_uv: bool, group: bool
+        self, kind: str, given: Parameters, matrix: Matrix, reverse: bool, uses_uv: bool, group: bool, back: bool
     ) -> Shape:
         radius = given.number("radius", 1, positive=True)
         sweep = min(max(given.number("phimax", 360), 0), 360)
@@ -131,22 +142,26 @@ class ShapeMaker:
         inner = given.number("innerradius", 0) if kind == "disk" else 0.0
         scale = transforms.similarity(matrix)
         if sweep == 360 and scale is not None:
-            flip = xml.value("boolean", "flip_normals", True) if reverse else None
+            flip = xml.value("boolean", "flip_normals", True) if reverse != back else None
+            gap = (
+                max(meshes.GAP * radius, meshes.GAP_LEAST * float(np.abs(matrix[:3, 3]).max()) / scale) if back else 0.0
+            )
+            lifted = gap if flip is None else -gap  # along the normal
             if kind == "sphere" and low <= -radius and high >= radius:
-                return self._sphere(matrix, radius, scale, flip)
+                return self._sphere(matrix, radius + lifted, scale, flip)
             if kind == "cylinder" and not group:  # Mitsuba sees no cylinders inside instances
                 line = [xml.point("p0", (0, 0, low)), xml.point("p1", (0, 0, high))]
-                size = xml.value("float", "radius", radius)
+                size = xml.value("float", "radius", radius + lifted)
                 return Shape(xml.plugin("shape", "cylinder", *line, size, xml.transform("to_world", matrix), flip))
             if kind == "disk" and inner == 0 and not uses_uv:
-                local = matrix @ transforms.translate(0, 0, height) @ np.diag([radius, radius, 1, 1])
+                local = matrix @ transforms.translate(0, 0, height + lifted) @ np.diag([radius, radius, 1, 1])
                 return Shape(xml.plugin("shape", "disk", xml.transform("to_world", local), flip))
         if kind != "disk":
             why = "part of it, or stretched" if kind in ("sphere", "cylinder") else "which Mitsuba lacks"
             self.report.note(given.place, f"a {kind}, {why}, is drawn as a mesh of {COLUMNS}×{ROWS} squares")
         self.budget.take((COLUMNS + 1) * (ROWS + 1), 2 * COLUMNS * ROWS, given.place)
         mesh = _tessellated(kind, radius, (low, high), height, inner, math.radians(sweep), given.place)
-        return self._written(meshes.placed(mesh, matrix, reverse, own_normals=False), given.place)
+        return self._written(meshes.placed(mesh, matrix, reverse, own_normals=False), given.place, back)
 
     def _sphere(self, matrix: Matrix, radius: float, scale: float, flip: Xml | None) -> Shape:
         """Mitsuba's sphere cannot be mirrored, and its v runs down: so a mirrored one has pbrt's v, and others not."""

@@ -107,15 +107,19 @@ function Upload({ onUploaded }) {
   const [main, setMain] = useState("");
   const [busy, setBusy] = useState("");
   const [faults, setFaults] = useState(/** @type {readonly string[]} */ ([]));
+  const [notes, setNotes] = useState(/** @type {readonly string[]} */ ([]));
   const [over, setOver] = useState(false);
 
   /** @param {File | undefined} file */
   async function send(file) {
     if (!file || busy) return;
     setFaults([]);
+    setNotes([]);
     setBusy(`Sending ${file.name}, ${bytes(file.size)}…`);
     try {
-      onUploaded(await api.upload(file, file.name.replace(/\.zip$/i, ""), main.trim()));
+      const scene = await api.upload(file, file.name.replace(/\.zip$/i, ""), main.trim());
+      onUploaded(scene);
+      setNotes(scene.notes ?? []);
       setMain("");
     } catch (error) {
       setFaults(faultsOf(error).map(({ detail }) => detail));
@@ -148,14 +152,21 @@ function Upload({ onUploaded }) {
     <button class="button" type="button" disabled=${busy !== ""} onClick=${() => input.current?.click()}>
       <${Icon} name="upload" /> Your own scene…
     </button>
-    <p class="hint">${busy || "A zip of a Mitsuba scene's folder, at most 256 MiB; or drop it here."}</p>
+    <p class="hint">${busy || "A zip of a Mitsuba or pbrt-v3 scene's folder, at most 256 MiB; or drop it here."}</p>
     <span class="spacer"></span>
-    <label class="parameter-line hint" title="Only where the folder has several XML files">
+    <label class="parameter-line hint" title="Only where the folder has several scene files">
       <span>main file</span>
       <input type="text" placeholder="scene.xml" value=${main} onInput=${onText(setMain)} />
     </label>
     <div class="upload-faults" role="alert">
       ${faults.map((fault) => html`<p class="fault" key=${fault}>${fault}</p>`)}
     </div>
+    ${
+      notes.length > 0 &&
+      html`<details class="upload-faults" open>
+        <summary>${counted(notes.length, "thing")} not as in the file</summary>
+        ${notes.map((note) => html`<p class="hint" key=${note}>${note}</p>`)}
+      </details>`
+    }
   </div>`;
 }

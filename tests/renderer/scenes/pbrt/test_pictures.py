@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from renderer.images import write_picture
 from tests.renderer.scenes.pbrt.conftest import FILM, Scenes
 
 Picture = Callable[..., np.ndarray]
@@ -95,6 +96,84 @@ def test_a_screen_window(scenes: Scenes, picture: Picture) -> None:
     assert seen(picture(scenes(mark(middle, 0, 0), options=options), spp=128)) == pytest.approx((16, 16), abs=0.6)
 
 
+LENS, FOCUS = 0.25, 5.0
+
+
+@pytest.mark.parametrize(("distance", "zoom"), [(5.0, 1), (2.5, 1), (3.5, 1), (10.0, 1), (5.0, 2)])
+def test_a_thin_lens(scenes: Scenes, picture: Picture, distance: float, zoom: float) -> None:
+    """
+    A point at the focal distance is sharp; another is a disc of radius lens · |focus − distance| / distance in the plane
+    in focus. Of a disc of radius r the mean square distance from its centre is r²/2; the lamp and the pixels have a
+    little of their own, less than a square pixel. A camera that is scaled has its lens and its focus scaled with it.
+    """
+    options = (
+        f'Scale {zoom} {zoom} {zoom} LookAt 0 0 -5 0 0 0 0 1 0 Camera "perspective" "float fov" 40 '
+        f'"float lensradius" {LENS * zoom} "float focaldistance" {FOCUS * zoom}\n' + FILM
+    )
+    lamp = f'AreaLightSource "diffuse"\nTranslate 0 0 {distance - 5}\nShape "sphere" "float radius" {0.01 * distance}'
+    found = picture(scenes(lamp, options=options), spp=2048, width=64, height=64).mean(axis=2).astype(float)
+    y, x = np.mgrid[:64, :64] - 31.5
+    square = float((found * (x**2 + y**2)).sum() / found.sum())
+    scale = 32 / np.tan(np.radians(20))  # pixels, of what is as large as its distance
+    radius = LENS * abs(FOCUS - distance) / distance / FOCUS * scale
+    own = 1 / 6 + (0.01 * scale) ** 2 / 2
+    assert square - own == pytest.approx(radius**2 / 2, rel=0.03, abs=0.2)
+
+
+BOX = [(x, y, z) for x in (-0.4, 0.6) for y in (-0.3, 0.5) for z in (-0.7, 0.2)]
+
+
+@pytest.mark.parametrize(
+    ("extra", "window", "per_unit"),
+    [("", "", 16), ("Scale .5 .5 .5", "", 8), ("", '"float screenwindow" [-2 2 -2 2]', 8), ("Scale -1 1 1", "", 16)],
+)
+def test_an_orthographic_camera(scenes: Scenes, picture: Picture, extra: str, window: str, per_unit: float) -> None:
+    """The corners of a box are where they project along the view: right = up × ahead, as pbrt's hands have it."""
+    eye, ahead = np.array([3.0, 2, -4]), -np.array([3.0, 2, -4])
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross([0, 1, 0], ahead)
+    right /= np.linalg.norm(right)
+    up = np.cross(ahead, right)
+    if "-1" in extra:
+        right = -right
+    options = f'{extra} LookAt 3 2 -4 0 0 0 0 1 0\nCamera "orthographic" {window}\n' + FILM
+    for corner in np.array(BOX):
+        x, y = seen(picture(scenes(mark(*corner), options=options), spp=64))
+        wanted = 16 + per_unit * (corner - eye) @ right, 16 - per_unit * (corner - eye) @ up
+        assert (x, y) == pytest.approx(wanted, abs=0.15), corner
+
+
+TURNS = {
+    "": np.eye(3),
+    "Rotate 90 1 0 0": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "Rotate -90 1 0 0 Rotate 30 0 0 1": np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
+    @ np.array([[np.sqrt(3) / 2, -0.5, 0], [0.5, np.sqrt(3) / 2, 0], [0, 0, 1]]),
+    "Scale -1 1 1": np.diag([-1.0, 1, 1]),
+    "Scale 2 2 2": np.eye(3),
+}
+
+
+@pytest.mark.parametrize("turn", TURNS)
+@pytest.mark.parametrize(("row", "column"), [(31, 0), (32, 53), (15, 75), (48, 120)])
+def test_an_environment_map_lies_as_in_pbrt(scenes: Scenes, picture: Picture, turn: str, row: int, column: int) -> None:
+    """
+    A bright texel is seen in the direction (sin θ cos φ, sin θ sin φ, cos θ) of the light's own space, with θ = π v from
+    the map's upper edge and φ = 2π u from its left one: the map's middle row is the horizon, z is up, and x at its left.
+    Mitsuba's rows go all the way to the poles, so one is up to half a row off.
+    """
+    height, width = 64, 128
+    texels = np.zeros((height, width, 3), np.float32)
+    texels[row, column] = 1
+    theta, phi = np.pi * (row + 0.5) / height, 2 * np.pi * (column + 0.5) / width
+    way = TURNS[turn] @ [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+    options = f'LookAt 0 0 0 {way[0]} {way[1]} {way[2]} .3 .5 .7\nCamera "perspective" "float fov" 16\n' + FILM
+    write_picture(scenes.folder / "sky.exr", texels, {})
+    world = f'AttributeBegin {turn}\nLightSource "infinite" "string mapname" "sky.exr"\nAttributeEnd'
+    found = picture(scenes(world, options=options), spp=64)
+    assert seen(found) == pytest.approx((16, 16), abs=180 / height / 2 * 32 / 16)
+    assert found.max() > 0.8
+
+
 def quarters(found: np.ndarray) -> np.ndarray:
     """Which of red, green, blue is strongest at four places inside the quad: top left, top right, bottom left, right."""
     return np.array([found[row, column] for row in (12, 20) for column in (12, 20)]).argmax(axis=1)
@@ -154,6 +233,30 @@ def test_the_side_to_which_a_lamp_shines(
     """Towards its normal (+z, away from the camera), as the transform carries it; ReverseOrientation turns it round."""
     lamp = f'AttributeBegin\n{directives}\nAreaLightSource "diffuse" "rgb L" [1 1 1]\n{shape}\nAttributeEnd\n'
     assert (picture(scenes(lamp), spp=16)[16, 16].mean() < 0.5) == away
+
+
+@pytest.mark.parametrize("shape", [TRIANGLES, 'Shape "disk"', 'Shape "sphere"', 'Shape "cone"',
+                                   'Rotate 90 1 0 0 Shape "cylinder"', 'Rotate 90 1 0 0 Shape "sphere" "float phimax" 180'])  # fmt: skip
+@pytest.mark.parametrize("directives", ["", "ReverseOrientation", "Scale 1 1 -1", "Rotate 180 0 1 0"])
+@pytest.mark.parametrize(("place", "camera"), [("0 0 0", "0 0 -5"), ("900 -900 900", "900 -900 895")])
+def test_a_twosided_lamp_shines_to_both_sides(
+    scenes: Scenes, picture: Picture, shape: str, directives: str, place: str, camera: str
+) -> None:
+    """Each of its pixels has its radiance, whichever side is seen: no ray takes one side for the other."""
+    lamp = f'Material "matte" "rgb Kd" [0 0 0] AttributeBegin\nTranslate {place} {directives}\nAreaLightSource "diffuse" "rgb L" [2 2 2] "bool twosided" "true"\n{shape}\nAttributeEnd\n'
+    source = scenes(lamp, options=f'LookAt {camera} {place} 0 1 0\nCamera "perspective" "float fov" 8\n' + FILM)
+    assert not any("twosided" in note for note in source.notes)
+    assert picture(source, spp=16) == pytest.approx(2)
+
+
+def test_a_twosided_lamp_lights_both_sides(scenes: Scenes, picture: Picture) -> None:
+    """A small lamp half-way between two walls gives both the same light."""
+    wall = 'Material "matte" "rgb Kd" [1 1 1]\nTranslate {} 0 0 Rotate 90 0 1 0\nShape "disk" "float radius" 9\n'
+    walls = "".join(f"AttributeBegin\n{wall.format(x)}AttributeEnd\n" for x in (-1, 1))
+    lamp = 'AreaLightSource "diffuse" "rgb L" [2 2 2] "bool twosided" "true"\nRotate 90 0 1 0\nShape "disk" "float radius" .2'
+    found = picture(scenes(walls + lamp), spp=2048)
+    assert found[12:20, :6].mean() == pytest.approx(found[12:20, 26:].mean(), rel=0.02)
+    assert found[12:20, :6].mean() > 0.001
 
 
 def test_instances(scenes: Scenes, picture: Picture) -> None:
