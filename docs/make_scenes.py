@@ -8,6 +8,7 @@ Text comes from where it is true, each scene's ``about.toml``; a picture is what
 from __future__ import annotations
 
 import argparse
+import json
 import os
 from pathlib import Path
 
@@ -31,8 +32,9 @@ HEAD = """\
 # The scenes
 
 Each is a folder of [renderer/scenes](../renderer/scenes) and a name in a grid: `scenes = ["sphere_figure"]`. All are
-closed, have a mean luminance near 0.2 and render at 256 × 256 unless a grid says otherwise. Pictures: the scene's own
-integrator, {spp} samples per pixel. This page is made by `docs/make_scenes.py` from the scenes' `about.toml`.
+closed and have a mean luminance near 0.2. Unless a grid says otherwise they render at 256 × 256 and are measured
+against the reference given here, its spp in all. Pictures: the scene's own integrator, {spp} samples per pixel. This
+page is made by `docs/make_scenes.py` from the scenes' `about.toml`.
 """
 
 
@@ -83,6 +85,7 @@ def page() -> str:
 
 def section(scene: BuiltinScene) -> str:
     told = [f"- *{title}*: {text}" for field, title in TOLD.items() if (text := getattr(scene, field))]
+    told.append(f"- *Reference*: {', '.join(f'`{key} = {json.dumps(item)}`' for key, item in scene.reference.items())}")
     return "\n".join(
         [f"## `{scene.name}` {scene.title}", "", scene.summary, "", f"![{scene.title}](scenes/{scene.name}.jpg)", "",
          *told, ""]

@@ -20,7 +20,8 @@ A grid has these keys; all but ``scenes`` may be left out. Where a list is expec
                  independent; all built-in scenes have box)
     colour       "rgb" or "spectral" (default: rgb)
     reference    what to measure against: { integrator, sampler, spp, replicates }, or false for no reference
-                 (default: path, independent, 4096 spp in total, 2 replicates)
+                 (default, key by key: what comes with a built-in scene, else path, independent, 4096 spp in total,
+                 2 replicates)
     sweep        tables [[sweep]]: parameter of a scene ("sphere.bsdf.nu"), values (numbers, or colours [r, g, b]), and
                  scenes, where it does not apply to all; several multiply
     scene        tables [scene.NAME]: resolution, crop, max_depth, rfilter, reference where one scene differs

@@ -1,8 +1,9 @@
 """
 What holds for each scene of a grid: resolution, crop, max_depth, filter and reference.
 
-They may be said for the whole grid, again in ``[scene.NAME]`` for one scene, and the scene file has its own: the
-nearest one counts, for a reference field by field. The checks that need a scene are here too. No Mitsuba.
+They may be said for the whole grid, again in ``[scene.NAME]`` for one scene, and the scene file has its own (a built-in
+scene also a reference): the nearest one counts, for a reference field by field. The checks that need a scene are here,
+too. No Mitsuba.
 """
 
 from __future__ import annotations
@@ -143,7 +144,7 @@ def _scene(name: str, place: str, find: Finder, own: _Settings | None, common: _
     rfilter = nearest("rfilter")[0] or problems.attempt(lambda: _own_filter(source, place))
     if rfilter is None:
         return None
-    return SceneRequest(source, width, height, crop, depth, rfilter, _reference(common, own))
+    return SceneRequest(source, width, height, crop, depth, rfilter, _reference(source, common, own))
 
 
 def _own_filter(source: sources.SceneSource, place: str) -> Choice:
@@ -209,9 +210,12 @@ def _check_right(fields: Table, sampler: Choice) -> None:
         fields.wrong(fields.place("sampler"), label, "a reference takes a correct sampler, such as independent")
 
 
-def _reference(common: _Settings, own: _Settings | None) -> ReferenceRequest | None:
-    """The reference of one scene: what the scene says, field by field, else the grid, else the defaults."""
-    said = [level.reference for level in (common, own) if level and level.reference is not None]
+def _reference(source: sources.SceneSource, common: _Settings, own: _Settings | None) -> ReferenceRequest | None:
+    """
+    The reference of one scene: what the grid says for it, field by field, else what it says for all, else what comes
+    with a built-in scene, else the defaults.
+    """
+    said: list[Any] = [level.reference for level in (common, own) if level and level.reference is not None]
     if said and said[-1] is False:
         return None
     fields: dict[str, Any] = {
@@ -220,6 +224,9 @@ def _reference(common: _Settings, own: _Settings | None) -> ReferenceRequest | N
         "asked_total": 4096,
         "replicates": 2,
     }
+    if source.reference:
+        table = Table({"reference": source.reference}, source.name, ["reference"], common.table.problems)
+        said.insert(0, _reference_fields(table, f"[reference] of {source.name}"))
     for level in said:
         fields |= level if isinstance(level, Mapping) else {}
     asked = -(-fields["asked_total"] // fields["replicates"])

@@ -179,6 +179,7 @@ def as_json() -> dict[str, list[dict[str, Any]]]:
             "hard_part": scene.hard_part,
             "bad_for": scene.bad_for,
             "lamp_in_frame": scene.lamp_in_frame,
+            "reference": dict(scene.reference),
         }
         for scene in BUILTIN.values()
     ]

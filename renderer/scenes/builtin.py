@@ -2,7 +2,8 @@
 The scenes that come with Dartboard: one folder each, with ``scene.xml`` and ``about.toml``.
 
 A new scene is a new folder; nothing else names it. ``about.toml`` is what the catalog tells people: what the scene is
-good for, what makes it hard, what it cannot show. It is no part of the scene's digest. No Mitsuba here.
+good for, what makes it hard, what it cannot show, and how a reference of it is made. It is no part of the scene's
+digest. No Mitsuba here.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,7 @@ class BuiltinScene:
     bad_for        questions that it cannot answer
     lamp_in_frame  None, or what a lamp in the picture does to the metrics and what to use instead
     source         whose idea it is, with the publication
+    reference      what it is measured against unless a grid says otherwise: keys and values of a grid's ``[reference]``
     folder         where its files are
     """
 
@@ -36,6 +39,7 @@ class BuiltinScene:
     bad_for: str
     lamp_in_frame: str | None
     source: str
+    reference: Mapping[str, Any]
     folder: Path
 
 

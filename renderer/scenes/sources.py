@@ -22,9 +22,10 @@ import shutil
 import tempfile
 import time
 import weakref
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from renderer.errors import EnvironmentProblem, SceneError, UnknownName, shown
 from renderer.scenes.builtin import BUILTIN
@@ -53,6 +54,7 @@ class SceneSource:
     digest    SHA-256 of main and files: the same on every machine, whatever else the folder holds
     builtin   True: shipped with Dartboard
     defaults  what the file itself says about size, integrator and sampler
+    reference of a built-in: what it is measured against where a grid says nothing, as a grid says it
     notes     of a pbrt file: what was replaced or ignored, a sentence each; logged as warnings, too
     """
 
@@ -64,6 +66,7 @@ class SceneSource:
     builtin: bool
     defaults: SceneDefaults
     notes: tuple[str, ...] = ()
+    reference: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     lent: TemporaryFolder | None = field(default=None, repr=False, compare=False)  # ``folder``, if it was made for this
 
 
@@ -83,7 +86,8 @@ def find(name: str, base: Path) -> SceneSource:
     Raises ``UnknownName`` or ``SceneError``.
     """
     if name in BUILTIN:
-        return _read(name, BUILTIN[name].folder, MAIN, builtin=True)
+        scene = BUILTIN[name]
+        return replace(_read(name, scene.folder, MAIN, builtin=True), reference=scene.reference)
     path = base.absolute() / name
     try:
         is_folder, is_file = path.is_dir(), path.is_file()

@@ -8,6 +8,7 @@ import os
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -121,6 +122,29 @@ def test_references_can_be_switched_off_everywhere_or_for_one_scene(whole, own, 
     own = {} if own == {} else {"reference": own}
     spec = parse(scenes=["cornell_box", "defocus"], reference=whole, scene={"defocus": own})
     assert tuple(scene.reference is not None for scene in spec.scenes) == wanted
+
+
+def test_a_built_in_scene_brings_its_reference(monkeypatch):
+    """Key by key: what the grid says for the scene, else for all, else the scene's own, else the defaults."""
+    own = {"integrator": "path:rr_depth=9", "spp": 999, "sampler": "multijitter"}
+    room = replace(sources.find("defocus", ROOT), reference=own)
+    monkeypatch.setattr(sources, "find", lambda name, base: room)
+
+    def told(**keys):
+        reference = parse(scenes=["room"], **keys).scenes[0].reference
+        names = [catalog.label("integrator", reference.integrator), reference.sampler.name]
+        return *names, reference.asked_total, reference.replicates
+
+    assert told() == told(reference=True) == ("path:rr_depth=9", "multijitter", 999, 2)
+    assert told(reference={"spp": 8, "replicates": 4}) == ("path:rr_depth=9", "multijitter", 8, 4)
+    nearer = {"room": {"reference": {"integrator": "path"}}}
+    assert told(reference={"spp": 8}, scene=nearer) == ("path", "multijitter", 8, 2)
+    assert parse(scenes=["room"], reference=False).scenes[0].reference is None
+
+
+def test_every_built_in_scene_is_a_grid_by_itself():
+    for name, scene in builtin.BUILTIN.items():
+        assert parse(scenes=[name]).scenes[0].reference.asked_total == scene.reference["spp"]
 
 
 def test_one_value_may_stand_without_a_list():

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from renderer import catalog
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import find
 from renderer.scenes.xmlfile import parse
@@ -60,6 +61,15 @@ def test_every_scene_is_described() -> None:
             text = getattr(scene, field.name)
             if isinstance(text, str) and field.name != "name":
                 assert text and "\n" not in text, (name, field.name)
+
+
+def test_every_scene_has_a_reference() -> None:
+    """Which the catalog tells, and which a grid takes as it is."""
+    told = {scene["name"]: scene["reference"] for scene in catalog.as_json()["scenes"]}
+    for name, scene in BUILTIN.items():
+        assert told[name] == scene.reference == find(name, Path()).reference
+        assert catalog.resolve("integrator", scene.reference["integrator"])
+        assert 2**12 <= scene.reference["spp"] <= 2**16, name
 
 
 def test_scenes_are_256_square_at_depth_6() -> None:
