@@ -22,6 +22,7 @@ from typing import Any
 import mitsuba as mi
 
 from renderer.errors import SceneError, shown
+from renderer.lightsamplers.prepared import Prepared
 from renderer.scenes.allowed import PLUGINS, PYTHON_PLUGINS, file_fault, string_fault, unknown_plugin
 from renderer.sweep import Settings
 
@@ -49,6 +50,11 @@ class LoadedScene:
     def settings(self) -> Settings:
         """What cells set in the scene."""
         return Settings(self.scene)
+
+    @cached_property
+    def lights(self) -> Prepared:
+        """Its light samplers, made when a cell first asks for one."""
+        return Prepared(self.scene)
 
 
 def load(
