@@ -282,6 +282,21 @@ test("rows are ordered by number, what has no value stands last, and the third c
   assert.deepEqual([nextSort("", "spp"), nextSort("spp", "spp"), nextSort("-spp", "spp")], ["spp", "-spp", null]);
 });
 
+test("a table with two sweeps and every metric fits into a window of 1440 px; its files have the whole names", () => {
+  const sweeps = { "sphere.bsdf.nu": [10, 10000], "sphere.bsdf.nv": [10, 10000] };
+  const metrics = ["mse", "mse_cross", "relmse", "mean_ratio"].map((name) => ({ ...RELMSE, name }));
+  const scenes = ["sphere_figure", "sphere_cosine/scene.xml"].map((name) => ({ ...DETAIL.scenes[0], name }));
+  const detail = { ...DETAIL, scenes, samplers: ["independent"], integrators: ["path"], sweeps, metrics };
+  const columns = columnsOf(detail);
+  const least = columns.reduce((sum, { width }) => sum + width, 92);
+  assert.ok(least <= 1390, `${least} px`); // what the page leaves of 1440
+  assert.deepEqual(columns.slice(3, 5).map(({ title, hint }) => [title, hint]), [["nu", "sphere.bsdf.nu"], ["nv", "sphere.bsdf.nv"]]);
+  assert.ok(asText([], columns, ",").includes("sphere.bsdf.nu,sphere.bsdf.nv"));
+  const titles = (...names) => columnsOf({ ...detail, sweeps: Object.fromEntries(names.map((name) => [name, [1]])) }).slice(3, 3 + names.length).map(({ title }) => title);
+  assert.deepEqual(titles("a.bsdf.nu", "b.bsdf.nu", "b.menu"), ["a.bsdf.nu", "b.bsdf.nu", "menu"]);
+  assert.deepEqual(titles("nu", "a.nu"), ["nu", "a.nu"]);
+});
+
 test("the filter takes words, and whole values with =", () => {
   const columns = columnsOf(DETAIL);
   const found = (filter) => grid().filter(matching(columns, filter)).length;

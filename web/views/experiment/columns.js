@@ -27,11 +27,12 @@ export function columnsOf(detail) {
     { name: "scene", title: "scene", numeric: false, width: widthOf(detail.scenes.map((scene) => scene.name)), value: (cell) => cell.scene },
     { name: "integrator", title: "integrator", numeric: false, width: widthOf(detail.integrators), value: (cell) => cell.integrator },
     { name: "sampler", title: "sampler", numeric: false, width: widthOf(detail.samplers, detail.replays.length ? 300 : 190), value: (cell) => cell.sampler },
-    ...Object.keys(detail.sweeps).map((parameter) => ({
+    ...Object.entries(detail.sweeps).map(([parameter, values]) => ({
       name: parameter,
-      title: parameter,
-      numeric: detail.sweeps[parameter]?.every((value) => typeof value === "number") ?? false,
-      width: widthOf([parameter]),
+      title: shortName(parameter, Object.keys(detail.sweeps)),
+      hint: parameter,
+      numeric: values.every((value) => typeof value === "number"),
+      width: widthOf([shortName(parameter, Object.keys(detail.sweeps)), ...values.map(String)], 190, 60),
       value: (/** @type {Cell} */ cell) => sorted(valueOn(cell, `sweep.${parameter}`)),
     })),
     {
@@ -64,7 +65,7 @@ export function columnsOf(detail) {
         const estimate = estimateOf(cell, metric.name);
         if (!estimate) return "–";
         const mean = meanText(estimate, metric);
-        return estimate.se === null ? mean : `${mean} ± ${estimate.se.toExponential(1)}`;
+        return (estimate.se === null ? mean : `${mean} ± ${estimate.se.toExponential(1)}`).replaceAll("e+", "e");
       },
       more: [{ name: `${metric.name}_se`, value: (/** @type {Cell} */ cell) => estimateOf(cell, metric.name)?.se ?? null }],
     })),
@@ -73,17 +74,25 @@ export function columnsOf(detail) {
       title: "seconds",
       hint: "mean render time of a picture, without compiling",
       numeric: true,
-      width: 72,
+      width: 80,
       value: (cell) => cell.seconds ?? null,
       show: (cell) => number(cell.seconds),
     },
-    { name: "state", title: "state", numeric: false, width: 100, value: (cell) => cell.state },
+    { name: "state", title: "state", numeric: false, width: detail.failed || detail.cells.cancelled ? 128 : 84, value: (cell) => cell.state },
   ];
 }
 
 /** px for the longest of some texts, within reason. @param {readonly string[]} texts */
-function widthOf(texts, most = 190) {
-  return Math.min(most, Math.max(84, 20 + 7.6 * Math.max(...texts.map((text) => text.length))));
+function widthOf(texts, most = 190, least = 84) {
+  return Math.min(most, Math.max(least, 20 + 7.6 * Math.max(...texts.map((text) => text.length))));
+}
+
+/** The last parts of a parameter's name that no other one ends with: "sphere.bsdf.nu" is "nu". @param {string} parameter @param {readonly string[]} all */
+function shortName(parameter, all) {
+  const parts = parameter.split(".");
+  const ends = parts.map((_, i) => parts.slice(parts.length - 1 - i).join("."));
+  const told = (/** @type {string} */ end) => all.some((other) => other !== parameter && `.${other}`.endsWith(`.${end}`));
+  return ends.find((end) => !told(end)) ?? parameter;
 }
 
 /** Swept numbers sort as numbers. @param {string | null} value */
