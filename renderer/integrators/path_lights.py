@@ -25,7 +25,7 @@ MAX_SURVIVAL = 0.95  # of Russian roulette, as Mitsuba's
 
 class PathLights(mi.SamplingIntegrator):
     """
-    light_sampler  how a lamp is picked: uniform, power, spatial (uniform)
+    light_sampler  how a lamp is picked: uniform, power, spatial, bvh (uniform)
     max_depth      edges of the longest path, 1 shows lamps alone; −1 for no bound (−1)
     rr_depth       edges after which Russian roulette may end a path (5)
     hide_emitters  lamps and sky are not seen directly (false)

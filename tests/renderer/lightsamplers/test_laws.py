@@ -24,10 +24,8 @@ def full_pmf(sampler: Any, p: Any, n: Any, points: int) -> np.ndarray:
 
     lane = dr.arange(mi.UInt32, points * sampler.count)
     at, index = lane // sampler.count, lane % sampler.count
-    pmf = sampler.pmf(dr.gather(mi.Point3f, p, at), dr.gather(mi.Normal3f, n, at), index) + dr.zeros(
-        mi.Float, len(lane)
-    )
-    return pmf.numpy().reshape(points, sampler.count).astype(np.float64)
+    pmf = sampler.pmf(dr.gather(mi.Point3f, p, at), dr.gather(mi.Normal3f, n, at), index)
+    return wide(pmf, points * sampler.count).reshape(points, sampler.count).astype(np.float64)
 
 
 def wide(value: Any, count: int) -> np.ndarray:
