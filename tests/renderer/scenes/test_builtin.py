@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 
 from renderer import catalog
@@ -110,6 +113,39 @@ def test_materials_have_short_names() -> None:
         assert all(e.attributes.get("id") for e in shapes), name
         assert not any("id" in b.attributes for e in anisotropic for b in e.children), name  # it would rename the key
     assert found >= 4
+
+
+def test_the_caustic_covers_a_seventh_of_its_scene(variant: str, tmp_path: Path) -> None:
+    """
+    The caustic is the part of the floor that the glass brightens by a quarter and more: what comes straight from the
+    lamp through the glass, against all light that is there with a black ball in its place.
+
+    Straight is what paths of at most four edges (camera, floor, glass, glass, lamp) gain by the glass: one by way of a
+    wall has five.
+    """
+    import mitsuba as mi
+
+    from renderer.scenes.load import load
+
+    side, folder = 24, BUILTIN["glass_caustic"].folder
+    text = (folder / "scene.xml").read_text("utf-8")
+    black = '<bsdf type="diffuse"><rgb name="reflectance" value="0"/></bsdf>'
+    (tmp_path / "scene.xml").write_text(re.sub('<bsdf type="dielectric">.*?</bsdf>', black, text, flags=re.DOTALL))
+    with_glass, with_ball = (load(place, "scene.xml", width=side, height=side) for place in (folder, tmp_path))
+
+    def light(scene: Any, depth: int, passes: int) -> np.ndarray:
+        integrator = mi.load_dict({"type": "path", "max_depth": depth})
+        seeds = range(0, 1_000_003 * passes, 1_000_003)  # further apart than a pass has samples
+        drawn = [np.array(mi.render(scene.scene, integrator=integrator, spp=1024, seed=seed)) for seed in seeds]
+        return np.mean(drawn, axis=0, dtype=np.float64) @ [0.2126, 0.7152, 0.0722]
+
+    caustic = light(with_glass, 4, 32) - light(with_ball, 4, 1)
+    y, x = (np.mgrid[:side, :side] + 0.5).reshape(2, -1) / side
+    ray, _ = with_glass.sensor.sample_ray(0, 0.5, mi.Point2f(x, y), mi.Point2f(0.5), True)
+    floor = next(shape for shape in with_glass.scene.shapes() if shape.id() == "floor")
+    on_floor = np.array(with_glass.scene.ray_intersect(ray).shape == mi.ShapePtr(floor)).reshape(side, side)
+    share = (on_floor & (caustic > light(with_ball, 10, 1) / 4)).mean()
+    assert share >= 0.15, share
 
 
 def test_corridor_has_64_lamps_of_very_different_power() -> None:
