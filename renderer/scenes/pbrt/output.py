@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from renderer.errors import SceneError
 from renderer.scenes.allowed import EXTENSIONS
+from renderer.scenes.pbrt import imagefile
 from renderer.scenes.pbrt.lexer import Place
 
 FILES_MAX = 10_000
@@ -34,11 +35,12 @@ class Output:
         return self.folder / name, name
 
     def picture(self, source: Path, place: Place) -> str:
-        """A copy of a picture; one for all who use it."""
+        """A copy of a picture; one for all who use it. Raises ``SceneError`` for what is none."""
         if source not in self.copies:
             if source.suffix.lower() not in PICTURES:
                 known = " ".join(sorted(PICTURES))
                 raise SceneError(f"{place}: {source.name} is no picture that is read here; allowed: {known}")
+            imagefile.check(source, place)
             target, name = self.new("textures", source.suffix.lower(), place)
             shutil.copyfile(source, target)
             self.copies[source] = name

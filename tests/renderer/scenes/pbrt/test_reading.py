@@ -3,14 +3,18 @@
 
 from __future__ import annotations
 
+import io
+import struct
 import subprocess
 import sys
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from PIL import Image
 
 from renderer.errors import DartboardError, SceneError
 from renderer.scenes.pbrt import lexer, meshes, noise, parser, ply, spectra
@@ -130,6 +134,17 @@ def test_filters_are_the_same_functions(scenes: Scenes, variant: str, kind: str)
     assert found / found[0] == pytest.approx(ALONG[kind](x) / ALONG[kind](0 * x)[0], abs=2e-3)
 
 
+def png(width: int, height: int) -> bytes:
+    """A grey picture, or the beginning of one that says that it is as large."""
+    if width * height > 2**20:
+        header = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+        return b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + header + struct.pack(">I", zlib.crc32(header))
+    file = io.BytesIO()
+    Image.new("L", (width, height)).save(file, "PNG")
+    return file.getvalue()
+
+
+PNG, VAST = png(64, 64), png(100_000, 100_000)
 BAD = {
     "unknown directive": ("Shpae \"sphere\"", "line 6: unknown directive 'Shpae'; did you mean Shape?"),
     "never ended": ("AttributeBegin", "line 6: AttributeBegin is not ended"),
@@ -141,6 +156,15 @@ BAD = {
     "include missing": ('Include "none.pbrt"', "line 6: the included file 'none.pbrt' does not exist"),
     "texture outside": ('Texture "t" "float" "imagemap" "string filename" "/a.png"', "line 6: the picture '/a.png' leads out"),
     "texture missing": ('Material "matte" "texture Kd" "none"\nShape "sphere"', "unknown texture 'none' in scene.pbrt, line 6"),
+    "texture no picture": ('Texture "t" "spectrum" "imagemap" "string filename" "no.png"\nMaterial "matte" "texture Kd" "t"\nShape "sphere"',
+                           "line 6: the picture 'no.png' cannot be read here"),
+    "texture cut": ('Texture "t" "spectrum" "imagemap" "string filename" "cut.png"\nMaterial "matte" "texture Kd" "t"\nShape "sphere"',
+                    "line 6: the picture 'cut.png' cannot be read here"),
+    "texture too large": ('Texture "t" "spectrum" "imagemap" "string filename" "big.png" "float scale" 2\nMaterial "matte" "texture Kd" "t"\nShape "sphere"',
+                          "line 6: the picture 'big.png' "),
+    "sky no picture": ('LightSource "infinite" "string mapname" "no.exr"', "line 6: the picture 'no.exr' cannot be read here"),
+    "sky no hdr": ('LightSource "infinite" "string mapname" "no.hdr"', "line 6: the picture 'no.hdr' cannot be read here"),
+    "sky no picture at all": ('LightSource "infinite" "string mapname" "cut.ply"', "line 6: cut.ply is no picture"),
     "mesh outside": ('Shape "plymesh" "string filename" "../a.ply"', "line 6: the mesh '../a.ply' leads out"),
     "ply truncated": ('Shape "plymesh" "string filename" "cut.ply"', "line 6: the mesh 'cut.ply' is truncated"),
     "not a ply": ('Shape "plymesh" "string filename" "scene.pbrt"', "is no PLY file"),
@@ -170,7 +194,9 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_bad_input_is_one_sentence_with_its_line(scenes: Scenes, case: str) -> None:
     world, words = BAD[case]
-    scenes.write(world, options=CAMERA + FILM, files={"cut.ply": PLY[:-12]})
+    nothing = dict.fromkeys(("no.png", "no.exr", "no.hdr"), "no picture")
+    files = {"cut.ply": PLY[:-12], "cut.png": PNG[:-20], "big.png": VAST, **nothing}
+    scenes.write(world, options=CAMERA + FILM, files=files)
     with pytest.raises(SceneError) as error:
         scenes.find()
     assert words in str(error.value)
