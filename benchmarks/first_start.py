@@ -21,10 +21,13 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+Said = list[tuple[float, str]]  # lines with the seconds at which they were said
+Row = tuple[str, float, float | None]  # phase, seconds, goal
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 NOBODY = 65534
@@ -41,15 +44,13 @@ def main() -> int:
         rows = []
         for name, goal in (("first", FIRST_GOAL_SECONDS), ("second", SECOND_GOAL_SECONDS)):
             picture, said = until_first_picture(folder, grid)
-            print(f"--- {name} start said:\n" + "".join(f"{at:7.2f} s  {line}\n" for at, line in said))
+            repeat(name, said)
             if picture is None:
                 print(f"the {name} start wrote no picture", file=sys.stderr)
                 return 1
             rows += phases(name, said)
             rows.append((f"{name} start: first picture", picture, goal))
-    print(f"{'phase':<42}{'seconds':>9}{'goal':>8}")
-    for label, seconds, limit in rows:
-        print(f"{label:<42}{seconds:>9.2f}" + (f"{limit:>8.0f}" if limit else ""))
+    show(rows)
     return 0
 
 
@@ -76,20 +77,13 @@ def bare_checkout() -> Iterator[Path]:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def until_first_picture(folder: Path, grid: str) -> tuple[float | None, list[tuple[float, str]]]:
+def until_first_picture(folder: Path, grid: str) -> tuple[float | None, Said]:
     """Seconds from the command to its first picture file, and each line it said with the second it said it."""
     data = folder / "data"
     shutil.rmtree(data, ignore_errors=True)
     started = time.monotonic()
     process = start(folder, "run", grid, "--data", str(data))
-    said: list[tuple[float, str]] = []
-
-    def listen() -> None:
-        for line in process.stderr or ():
-            said.append((time.monotonic() - started, line.rstrip()))
-
-    listener = threading.Thread(target=listen, daemon=True)
-    listener.start()
+    said, listener = listen(process, started)
     picture = None
     while process.poll() is None and picture is None and time.monotonic() - started < LIMIT_SECONDS:
         if any(data.glob("images/**/*.exr")):
@@ -98,12 +92,7 @@ def until_first_picture(folder: Path, grid: str) -> tuple[float | None, list[tup
     if picture is None and any(data.glob("images/**/*.exr")):
         picture = time.monotonic() - started
     if process.poll() is None:
-        process.send_signal(signal.SIGINT)
-        try:
-            process.wait(20)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        end(process, signal.SIGINT)
     listener.join(5)
     return picture, said
 
@@ -122,7 +111,40 @@ def start(folder: Path, *words: str) -> subprocess.Popen[str]:
     )  # fmt: skip
 
 
-def phases(start: str, said: list[tuple[float, str]]) -> list[tuple[str, float, float | None]]:
+def listen(process: subprocess.Popen[str], started: float) -> tuple[Said, threading.Thread]:
+    """What the start says, which grows while it speaks, and who hears it."""
+    said: Said = []
+
+    def hear() -> None:
+        for line in process.stderr or ():
+            said.append((time.monotonic() - started, re.sub(r"/\S+/", "", line.rstrip())))
+
+    listener = threading.Thread(target=hear, daemon=True)
+    listener.start()
+    return said, listener
+
+
+def end(process: subprocess.Popen[str], how: signal.Signals) -> None:
+    """Asks a start to end, and ends it where it does not."""
+    process.send_signal(how)
+    try:
+        process.wait(20)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def repeat(name: str, said: Said) -> None:
+    print(f"--- {name} start said:\n" + "".join(f"{at:7.2f} s  {line}\n" for at, line in said))
+
+
+def show(rows: Iterable[Row]) -> None:
+    print(f"{'phase':<42}{'seconds':>9}{'goal':>8}")
+    for label, seconds, limit in rows:
+        print(f"{label:<42}{seconds:>9.2f}" + (f"{limit:>8.0f}" if limit else ""))
+
+
+def phases(start: str, said: Said) -> list[Row]:
     """The launcher's own account: `ready in 17.0 s: .venv 0.1 s, packages 16.7 s, …`."""
     account = next((line.partition(" s: ")[2] for _, line in said if "ready in" in line), "")
     found = re.findall(r"([^,]+?) ([\d.]+) s(?:, |$)", account)

@@ -11,18 +11,15 @@ data too: what counts is the list, and the experiment's page with its pictures w
 
 from __future__ import annotations
 
-import os
-import re
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 from playwright.sync_api import Error, Page
 
 from benchmarks.browser import PICTURE, chromium, free_port, opened
-from benchmarks.first_start import bare_checkout, phases, start
+from benchmarks.first_start import Row, bare_checkout, end, listen, phases, repeat, show, start
 
 FIRST_GOAL_SECONDS, SECOND_GOAL_SECONDS = 180.0, 3.0  # what issue 3 asks for
 LIMIT_SECONDS = 600.0
@@ -31,14 +28,14 @@ DECODED = "() => [...document.querySelectorAll('" + PICTURE + "')].some((one) =>
 
 
 def main() -> int:
-    rows: list[tuple[str, float, float | None]] = []
+    rows: list[Row] = []
     with bare_checkout() as folder, chromium() as browser:
         port = free_port()
         for name in ("first", "second"):
             with opened(browser) as page:
                 started = time.monotonic()
                 process = start(folder, "up", "--port", str(port), "--data", str(folder / "data"))
-                said = listen(process, started)
+                said, _ = listen(process, started)
                 address = f"http://127.0.0.1:{port}"
                 if name == "second":
                     rows.append(("second start: list usable", shown(page, address, "main a", started, process), None))
@@ -46,24 +43,10 @@ def main() -> int:
                 goal = FIRST_GOAL_SECONDS if name == "first" else SECOND_GOAL_SECONDS
                 rows += phases(name, said)
                 rows.append((f"{name} start: picture on the page", picture, goal))
-            print(f"--- {name} start said:\n" + "".join(f"{at:7.2f} s  {line}\n" for at, line in said))
-            end(process)
-    print(f"{'phase':<42}{'seconds':>9}{'goal':>8}")
-    for label, seconds, limit in rows:
-        print(f"{label:<42}{seconds:>9.2f}" + (f"{limit:>8.0f}" if limit else ""))
+            repeat(name, said)
+            end(process, signal.SIGTERM)
+    show(rows)
     return 0
-
-
-def listen(process: subprocess.Popen[str], started: float) -> list[tuple[float, str]]:
-    """Each line that the start says, with the second at which it says it; grows while it speaks."""
-    said: list[tuple[float, str]] = []
-
-    def hear() -> None:
-        for line in process.stderr or ():
-            said.append((time.monotonic() - started, re.sub(r"/\S+/", "", line.rstrip())))
-
-    threading.Thread(target=hear, daemon=True).start()
-    return said
 
 
 def shown(page: Page, address: str, selector: str, started: float, process: subprocess.Popen[str]) -> float:
@@ -79,15 +62,6 @@ def shown(page: Page, address: str, selector: str, started: float, process: subp
             return time.monotonic() - started
         time.sleep(POLL_SECONDS)
     raise SystemExit(f"{address} never showed {selector}; the server ended with {process.poll()}")
-
-
-def end(process: subprocess.Popen[str]) -> None:
-    process.send_signal(signal.SIGTERM)
-    try:
-        process.wait(20)
-    except subprocess.TimeoutExpired:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
 
 
 if __name__ == "__main__":
