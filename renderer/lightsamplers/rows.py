@@ -15,6 +15,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
+from renderer.errors import SceneError
 from renderer.lightsamplers.base import ONE_BELOW, floats_on_device
 
 UNITS = 2**23
@@ -55,11 +56,12 @@ def running_sums(weights: NDArray[np.floating[Any]]) -> NDArray[np.float32]:
     """
     The table of ``weights``, shape (rows, columns): finite, ≥ 0, in any unit; a row of zeros becomes uniform.
 
-    Multiples of 2⁻²³ that grow from 0 to 1 along each row, shape (rows, columns + 1).
+    Multiples of 2⁻²³ that grow from 0 to 1 along each row, shape (rows, columns + 1). Raises ``SceneError`` above 2²²
+    columns.
     """
     rows, columns = weights.shape
     if columns > UNITS // 2:
-        raise ValueError(f"{columns} lamps; a distribution holds at most {UNITS // 2}")
+        raise SceneError(f"the scene has {columns} lamps; lamps are picked among at most {UNITS // 2}")
     sums = np.zeros((rows, columns + 1))
     np.cumsum(weights, axis=1, out=sums[:, 1:], dtype=np.float64)
     total = sums[:, -1:].copy()

@@ -89,29 +89,39 @@ def voxel_table(
 ) -> NDArray[np.float32]:  # fmt: skip
     """The running sums of all voxels, x slowest, one row each."""
     lamps, cells = len(power), math.prod(shape)
+    light = arriving(scene, low, size, shape).reshape(cells, lamps)
+    out = np.empty((cells, lamps + 1), np.float32)
+    at_once = max(1, CHUNK // (8 * lamps))
+    for first in range(0, cells, at_once):
+        some = slice(first, first + at_once)
+        total = light[some].sum(axis=1, keepdims=True, dtype=np.float64)
+        share = np.divide(light[some], total, out=np.tile(power, (len(total), 1)), where=total > 0)
+        out[some] = running_sums((1 - DEFENSIVE) * share + DEFENSIVE * power)
+    return out
+
+
+def arriving(
+    scene: Any, low: NDArray[np.float64], size: NDArray[np.float64], shape: tuple[int, int, int]
+) -> NDArray[np.float32]:
+    """Luminance that arrives from each lamp in each voxel, lamps fastest; a sum over the points, finite and ≥ 0."""
+    lamps = len(scene.emitters())
     points = [floats_on_device(column) for column in radical_inverses(POINTS, 6).T]
     corner = mi.Point3f(dr.opaque(mi.Float, x) for x in low)
     side = mi.Vector3f(dr.opaque(mi.Float, x / n) for x, n in zip(size, shape, strict=True))
     rows, columns, count = (dr.opaque(mi.UInt32, n) for n in (shape[1], shape[2], lamps))
-    out = np.empty((cells, lamps + 1), np.float32)
-    at_once = max(1, CHUNK // (POINTS * lamps))
-    for first in range(0, cells, at_once):
-        some = slice(first, min(first + at_once, cells))
-        width = (some.stop - first) * lamps * POINTS
-        lane = dr.arange(mi.UInt32, width)
-        pair, point = lane // POINTS, lane % POINTS
+    out = np.empty(math.prod(shape) * lamps, np.float32)
+    at_once = CHUNK // POINTS
+    for first in range(0, len(out), at_once):
+        some = slice(first, min(first + at_once, len(out)))
+        lane = dr.arange(mi.UInt32, (some.stop - first) * POINTS)
+        pair, point = dr.opaque(mi.UInt32, first) + lane // POINTS, lane % POINTS
         voxel = pair // count
         emitter = dr.gather(mi.EmitterPtr, scene.emitters_dr(), pair - voxel * count)
-        voxel += dr.opaque(mi.UInt32, first)
         slab = voxel // columns
         place = mi.Vector3u(slab // rows, slab % rows, voxel % columns)
         x, y, z, u, v, wavelength = (dr.gather(mi.Float, column, point) for column in points)
         it, weight = lit_point(corner + (mi.Vector3f(place) + mi.Vector3f(x, y, z)) * side, wavelength)
-        _, arriving = emitter.sample_direction(it, mi.Point2f(u, v))
-        light = mi.luminance(arriving * weight, it.wavelengths)
-        light = dr.block_sum(dr.select(dr.isfinite(light), dr.maximum(light, 0), 0), POINTS).numpy()
-        light = light.reshape(-1, lamps).astype(np.float64)
-        total = light.sum(axis=1, keepdims=True)
-        np.divide(light, total, out=light, where=total > 0)
-        out[some] = running_sums(np.where(total > 0, (1 - DEFENSIVE) * light + DEFENSIVE * power, power))
+        _, radiance = emitter.sample_direction(it, mi.Point2f(u, v))
+        light = mi.luminance(radiance * weight, it.wavelengths)
+        out[some] = dr.block_sum(dr.select(dr.isfinite(light), dr.maximum(light, 0), 0), POINTS).numpy()
     return out

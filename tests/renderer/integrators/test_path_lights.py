@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -239,6 +241,31 @@ def test_means_are_equal_in_the_corridor(name: str, corridor: Any) -> None:
     if name in ("spatial", "bvh"):
         ratio = native.var(0, ddof=1).mean() / ours.var(0, ddof=1).mean()
         assert ratio > 5, ratio
+
+
+SPECTRAL = """
+import sys
+from renderer.variant import use
+use("llvm_ad_spectral")
+from tests.renderer.integrators import test_path_lights as t
+import mitsuba as mi, numpy as np
+from renderer.integrators.path_lights import PathLights
+from renderer.lightsamplers import NAMES
+mi.register_integrator("path_lights", PathLights)
+scene = mi.load_dict(t.mixed_scene("envmap"))
+native = t.pictures(scene, t.integrator(None), 128, 12)
+ours = t.pictures(scene, t.integrator("uniform"), 128, 12)
+print(np.isclose(ours, native, rtol=1e-3, atol=1e-5).mean() > 0.99)
+for name in NAMES[1:]:
+    print(np.abs(t.z(t.pictures(scene, t.integrator(name), 128, 12), native)).max() < t.Z)
+"""
+
+
+def test_the_same_in_spectral_colours() -> None:
+    """In a process of its own: a variant cannot be taken back."""
+    done = subprocess.run([sys.executable, "-c", SPECTRAL], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["True"] * len(NAMES), done.stdout
 
 
 # -- kernels ---------------------------------------------------------------------------------------------------

@@ -36,7 +36,7 @@ def mixed_scene(environment: str = "constant", **more: Any) -> dict[str, Any]:
         "glass": {"type": "sphere", "center": [0.8, -0.6, 0.5], "radius": 0.4, "bsdf": {"type": "dielectric"}},
         "panel": {"type": "rectangle", "emitter": area(light(WHITE)),
                   "to_world": place().translate([0, 1.4, 0]).rotate([1, 0, 0], 90).scale(0.3)},
-        "picture": {"type": "rectangle", "emitter": area({"type": "bitmap", "bitmap": picture, "raw": True}),
+        "picture": {"type": "rectangle", "emitter": area({"type": "bitmap", "bitmap": picture, "raw": mi.is_rgb}),
                     "to_world": place().translate([-1.4, 0, 0]).rotate([0, 1, 0], 90).scale(0.3)},
         "ball": {"type": "sphere", "center": [1, 0.8, -0.6], "radius": 0.15, "emitter": area(light(RED))},
         "cube": {"type": "cube", "emitter": area(light(BLUE)),
