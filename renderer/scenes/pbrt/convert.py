@@ -2,7 +2,7 @@
 A pbrt-v3 scene becomes a Mitsuba scene: ``scene.xml`` with its meshes and pictures beside it.
 
 pbrt's file is a program for a state machine: transforms, material, area light and orientation are set, and shapes take
-what is current. This module is that machine; what the things become is the business of the others.
+what is current. This module is that machine; the scene grows in ``assembly``.
 
 The folder that is made holds nothing but what we wrote: plugins of the list, numbers, plain words, names of files made
 here. It is vetted all the same, like any scene. No Mitsuba here, as the owner of a data directory converts.
@@ -10,24 +10,23 @@ here. It is vetted all the same, like any scene. No Mitsuba here, as the owner o
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from renderer.errors import SceneError, UnknownName, shown
 from renderer.scenes.pbrt import camera, settings, transforms, xml
+from renderer.scenes.pbrt.assembly import Assembly, State
 from renderer.scenes.pbrt.lexer import Place
-from renderer.scenes.pbrt.lights import Lamp, LightReader
-from renderer.scenes.pbrt.materials import OVERRIDES, Material, MaterialWriter, Surface
+from renderer.scenes.pbrt.lights import LightReader
+from renderer.scenes.pbrt.materials import Material
 from renderer.scenes.pbrt.output import Output
 from renderer.scenes.pbrt.parameters import Parameters
 from renderer.scenes.pbrt.parser import NUMERIC, Directive, Folder, directives
 from renderer.scenes.pbrt.report import Report
-from renderer.scenes.pbrt.shapes import ShapeMaker
-from renderer.scenes.pbrt.textures import Reader, Texture
-from renderer.scenes.pbrt.texturexml import TextureWriter
+from renderer.scenes.pbrt.textures import Reader
 from renderer.scenes.pbrt.transforms import IDENTITY, Matrix
 from renderer.scenes.pbrt.xml import Xml
 
@@ -55,47 +54,23 @@ def convert(source: Path, into: Path) -> list[str]:
     return machine.report.notes
 
 
-@dataclass(frozen=True)
-class _State:
-    """What AttributeBegin saves."""
-
-    matrix: Matrix
-    material: Material
-    reverse: bool = False
-    lamp: Lamp | None = None
-    floats: Mapping[str, Texture] = field(default_factory=dict)
-    spectra: Mapping[str, Texture] = field(default_factory=dict)
-    materials: Mapping[str, Material] = field(default_factory=dict)
-
-
 class _Machine:
     """Takes directives in order; ``finish`` gives the scene."""
 
     def __init__(self, folder: Folder, output: Output):
         self.report = Report()
         self.folder = folder
-        textures = TextureWriter(output, self.report)
-        self.writer = MaterialWriter(folder, self.report, textures)
-        self.textures = textures
-        self.shapes = ShapeMaker(folder, self.report, output)
+        self.assembly = Assembly(folder, self.report, output)
         self.lights = LightReader(folder, self.report, output)
         nowhere = Parameters("the default material", Place("", 0))
         self.default = Material("matte", nowhere, {}, {}, name="default")
-        self.state = _State(IDENTITY, self.default)
-        self.saved: list[tuple[str, _State, Place]] = []
+        self.state = State(IDENTITY, self.default)
+        self.saved: list[tuple[str, State, Place]] = []
         self.systems: dict[str, Matrix] = {}
         self.options: dict[str, tuple[str, Parameters]] = {}
         self.view = IDENTITY  # world → camera
         self.active = True  # whether transforms apply to the start of the shutter, which is what is drawn
         self.in_world = self.done = False
-        self.bsdfs: dict[tuple[int, bool], tuple[str, Material]] = {}
-        self.surfaces: dict[int, tuple[Surface, Material]] = {}
-        self.identities: set[str] = set()
-        self.objects: dict[str, tuple[Xml, int]] = {}
-        self.group: Xml | None = None
-        self.group_name = ""
-        self.head: list[Xml] = []  # BSDFs and shape groups
-        self.body: list[Xml] = []  # shapes, instances and emitters
         self.handlers: dict[str, Callable[[Directive], None]] = {
             name: getattr(self, method)
             for name, method in {
@@ -146,17 +121,10 @@ class _Machine:
         size = settings.film_size(film[1] if film else None)
         root.append(camera.sensor(kind, given, self.view, size, self.report, parts))
         for _, given in self.options.values():
-            self.unknown(given)
-        root.extend(self.head)
-        root.extend(self.body)
+            self.report.unknown(given)
+        root.extend(self.assembly.head)
+        root.extend(self.assembly.body)
         return root
-
-    def unknown(self, given: Parameters) -> None:
-        """One warning for each parameter that nobody took."""
-        for item in given.leftovers():
-            self.report.note(
-                item.place, f'"{item.kind} {item.name}" is no parameter of {given.owner} here; it is ignored'
-            )
 
     # Transforms and blocks.
 
@@ -212,33 +180,17 @@ class _Machine:
 
     def begin_object(self, directive: Directive) -> None:
         self.need_world(directive)
-        if self.group is not None:
-            raise SceneError(f"{directive.place}: ObjectBegin inside of another object; end that one first")
+        self.assembly.check_no_object(directive.place, "ObjectBegin inside of another object; end that one first")
         self.begin(directive)
-        name = directive.words[0]
-        self.group = xml.plugin("shape", "shapegroup", identity=self.identity(xml.word(name)))
-        self.group_name = name
+        self.assembly.begin_object(directive.words[0])
 
     def end_object(self, directive: Directive) -> None:
         self.end(directive)
-        assert self.group is not None
-        group, self.group = self.group, None
-        self.objects[self.group_name] = group, len(group)
-        if len(group):
-            self.head.append(group)
+        self.assembly.end_object()
 
     def instance(self, directive: Directive) -> None:
         self.need_world(directive)
-        name = directive.words[0]
-        if name not in self.objects:
-            raise SceneError(str(UnknownName("object", name, str(directive.place), list(self.objects)[:20])))
-        if self.group is not None:
-            raise SceneError(f"{directive.place}: ObjectInstance inside of an object is not supported; draw its shapes")
-        group, count = self.objects[name]
-        if count:
-            made = xml.plugin("shape", "instance", xml.reference(group.get("id", "")))
-            made.append(xml.transform("to_world", self.state.matrix))
-            self.body.append(made)
+        self.assembly.instance(directive.words[0], self.state.matrix, directive.place)
 
     # What the scene is made of.
 
@@ -265,7 +217,7 @@ class _Machine:
             self.state = replace(state, floats={**state.floats, name: made})
         else:
             self.state = replace(state, spectra={**state.spectra, name: made})
-        self.unknown(given)
+        self.report.unknown(given)
 
     def material(self, directive: Directive) -> None:
         self.state = replace(self.state, material=self.defined(directive.words[0], directive.parameters))
@@ -292,90 +244,21 @@ class _Machine:
         self.need_world(directive)
         given = directive.parameters
         self.state = replace(self.state, lamp=self.lights.area(directive.words[0], given))
-        self.unknown(given)
+        self.report.unknown(given)
 
     def light(self, directive: Directive) -> None:
         self.need_world(directive)
         made = self.lights.source(directive.words[0], directive.parameters, self.state.matrix)
         if made is not None:
-            self.body.append(made)
-        self.unknown(directive.parameters)
+            self.assembly.body.append(made)
+        self.report.unknown(directive.parameters)
 
     def medium(self, directive: Directive) -> None:
         self.report.note(directive.place, "media are not supported: light crosses them as a vacuum", once="media")
 
     def shape(self, directive: Directive) -> None:
         self.need_world(directive)
-        state, given = self.state, directive.parameters
-        material = state.material
-        own = bool(OVERRIDES & given.items.keys())
-        if own:
-            given.fallback = material.parameters
-        bsdf = given if own else material.parameters
-        surface = self.surface(material, bsdf, own)
-        lamp = state.lamp
-        if lamp is not None and self.group is not None:
-            self.report.note(directive.place, "a lamp inside an object does not shine, as in pbrt-v3")
-            lamp = None
-        reader = Reader(self.folder, self.report, state.floats, state.spectra)
-        alpha = reader.value(given, "alpha", None, 1)
-        if "shadowalpha" in given:
-            self.report.note(directive.place, "shadowalpha is left out: what is transparent casts no shadow")
-            given.ignore("shadowalpha")
-        shines = lamp is not None and bool(lamp.radiance.any())
-        for back in (False, True) if lamp and shines and lamp.twosided else (False,):
-            made = self.shapes.make(
-                directive.words[0], given, state.matrix, reverse=state.reverse, lamp=lamp is not None, back=back,
-                uses_uv=surface.uses_uv or "alpha" in given, group=self.group is not None,
-            )  # fmt: skip
-            if made is None:
-                return
-            upside_down = made.upside_down and surface.textured
-            if own:
-                part = self.writer.write(material, bsdf, state.materials, upside_down=upside_down).bsdf
-            else:
-                part = xml.reference(self.shared(material, surface, upside_down))
-            if alpha is not None:
-                cut = self.textures.write(alpha, "opacity", upside_down=made.upside_down)
-                part = xml.plugin("bsdf", "mask", cut, part)
-            made.shape.set("id", self.identity(f"{xml.word(directive.words[0])}_{directive.place.line}"))
-            made.shape.append(part)
-            if lamp and shines:
-                made.shape.append(xml.plugin("emitter", "area", xml.rgb("radiance", lamp.radiance)))
-            (self.body if self.group is None else self.group).append(made.shape)
-        if own:
-            given.ignore(*OVERRIDES)
-        self.unknown(given)
-
-    def surface(self, material: Material, given: Parameters, own: bool) -> Surface:
-        """The BSDF of a material as it is; made once unless the shape has a say."""
-        if not own and id(material) in self.surfaces:
-            return self.surfaces[id(material)][0]
-        made = self.writer.write(material, given, self.state.materials, upside_down=False)
-        if not own:
-            self.surfaces[id(material)] = made, material  # kept alive, or another would have its id
-        self.unknown(material.parameters)
-        return made
-
-    def shared(self, material: Material, surface: Surface, upside_down: bool) -> str:
-        """The name of a material's BSDF, written at the head of the scene the first time."""
-        key = id(material), upside_down
-        if key not in self.bsdfs:
-            made = surface.bsdf
-            if upside_down:
-                made = self.writer.write(material, material.parameters, self.state.materials, upside_down=True).bsdf
-            made.set("id", self.identity(material.identity + "_sphere" * upside_down))
-            self.head.append(made)
-            self.bsdfs[key] = made.get("id", ""), material
-        return self.bsdfs[key][0]
-
-    def identity(self, wanted: str) -> str:
-        """A name that no other thing has."""
-        found, number = wanted, 2
-        while found in self.identities:
-            found, number = f"{wanted}_{number}", number + 1
-        self.identities.add(found)
-        return found
+        self.assembly.shape(directive.words[0], directive.parameters, self.state)
 
     def need_world(self, directive: Directive) -> None:
         if not self.in_world:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from renderer.errors import SceneError
 from renderer.scenes.pbrt.lexer import Place
+from renderer.scenes.pbrt.parameters import Parameters
 
 NOTES_MAX = 200  # a hostile file has millions
 ERRORS_SHOWN = 3
@@ -31,6 +32,11 @@ class Report:
             self.notes.append(f"{place}: {text}")
         else:
             self._more += 1
+
+    def unknown(self, given: Parameters) -> None:
+        """One warning for each parameter that nobody took."""
+        for item in given.leftovers():
+            self.note(item.place, f'"{item.kind} {item.name}" is no parameter of {given.owner} here; it is ignored')
 
     def lacks(self, place: Place, text: str) -> None:
         """An error; all are told together at the end (``check``)."""

@@ -66,31 +66,47 @@ class UVMapping:
 
 
 @dataclass(frozen=True, eq=False)
-class Checkerboard(Texture):
+class Mapped(Texture):
+    """A texture over (s, t), to which ``mapping`` leads."""
+
     mapping: UVMapping
-    first: Texture
-    second: Texture
 
     def at(self, u: Floats, v: Floats) -> Floats:
-        s, t = self.mapping(u, v)
-        even = (np.floor(s) + np.floor(t)) % 2 == 0
-        return np.where(even[..., None], self.first.at(u, v), self.second.at(u, v))
+        return self.over(*self.mapping(u, v), u, v)
+
+    def over(self, s: Floats, t: Floats, u: Floats, v: Floats) -> Floats:
+        """``at``, of both coordinates: its parts are over (u, v)."""
+        raise NotImplementedError
 
 
 @dataclass(frozen=True, eq=False)
-class Dots(Texture):
-    mapping: UVMapping
-    inside: Texture
-    outside: Texture
+class Pattern(Mapped):
+    """One of two textures, by the place."""
 
-    def at(self, u: Floats, v: Floats) -> Floats:
-        s, t = self.mapping(u, v)
+    first: Texture
+    second: Texture
+
+    def over(self, s: Floats, t: Floats, u: Floats, v: Floats) -> Floats:
+        return np.where(self.takes_first(s, t)[..., None], self.first.at(u, v), self.second.at(u, v))
+
+    def takes_first(self, s: Floats, t: Floats) -> NDArray[np.bool_]:
+        raise NotImplementedError
+
+
+class Checkerboard(Pattern):
+    def takes_first(self, s: Floats, t: Floats) -> NDArray[np.bool_]:
+        return (np.floor(s) + np.floor(t)) % 2 == 0
+
+
+class Dots(Pattern):
+    """``first`` inside of the dots."""
+
+    def takes_first(self, s: Floats, t: Floats) -> NDArray[np.bool_]:
         column, row = np.floor(s + 0.5), np.floor(t + 0.5)
         room = 0.5 - DOT_RADIUS
         ds = s - (column + room * noise(column + 1.5, row + 2.8))
         dt = t - (row + room * noise(column + 4.5, row + 9.8))
-        dot = (noise(column + 0.5, row + 0.5) > 0) & (ds**2 + dt**2 < DOT_RADIUS**2)
-        return np.where(dot[..., None], self.inside.at(u, v), self.outside.at(u, v))
+        return (noise(column + 0.5, row + 0.5) > 0) & (ds**2 + dt**2 < DOT_RADIUS**2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,28 +130,22 @@ class Mixed(Texture):
 
 
 @dataclass(frozen=True, eq=False)
-class Bilerp(Texture):
-    mapping: UVMapping
+class Bilerp(Mapped):
     corners: tuple[Texture, Texture, Texture, Texture]  # at (0,0), (0,1), (1,0), (1,1)
 
-    def at(self, u: Floats, v: Floats) -> Floats:
-        s, t = (axis[..., None] for axis in self.mapping(u, v))
+    def over(self, s: Floats, t: Floats, u: Floats, v: Floats) -> Floats:
+        s, t = s[..., None], t[..., None]
         v00, v01, v10, v11 = (corner.at(u, v) for corner in self.corners)
         return (1 - s) * ((1 - t) * v00 + t * v01) + s * ((1 - t) * v10 + t * v11)
 
 
-@dataclass(frozen=True, eq=False)
-class UVColour(Texture):
-    mapping: UVMapping
-
-    def at(self, u: Floats, v: Floats) -> Floats:
-        s, t = self.mapping(u, v)
+class UVColour(Mapped):
+    def over(self, s: Floats, t: Floats, u: Floats, v: Floats) -> Floats:
         return np.stack([s - np.floor(s), t - np.floor(t), np.zeros_like(s)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
-class ImageMap(Texture):
-    mapping: UVMapping
+class ImageMap(Mapped):
     path: Path
     wrap: str  # "repeat", "black" or "clamp"
     srgb: bool
@@ -146,9 +156,8 @@ class ImageMap(Texture):
     def pixels(self) -> Floats:
         return imagefile.read(self.path, self.srgb, self.place) * self.scale
 
-    def at(self, u: Floats, v: Floats) -> Floats:
+    def over(self, s: Floats, t: Floats, u: Floats, v: Floats) -> Floats:
         """Bilinear between pixel centres, as Mitsuba and pbrt do it."""
-        s, t = self.mapping(u, v)
         height, width = self.pixels.shape[:2]
         x, y = s * width - 0.5, (1 - t) * height - 0.5
         i, j = np.floor(x).astype(int), np.floor(y).astype(int)
