@@ -33,9 +33,10 @@ OUR_BSDFS = frozenset({"anisophong"})  # renderer.plugins.bsdfs, which cannot be
 OUR_SAMPLERS = frozenset(
     {"eliminated", "halton", "pmj02bn", "poissondisk", "relaxedpoissondisk", "sobol", "zsobol"}
 )  # fmt: skip
+OUR_INTEGRATORS = frozenset({"bdpt"})  # by the catalog's name: a scene's integrator is a default, and never loaded
 # Registered from Python: our materials and samplers, and Mitsuba's own integrators. Those are replaced by the cell's,
 # as every integrator of a file, but may be named.
-PYTHON_PLUGINS = OUR_BSDFS | OUR_SAMPLERS | {
+PYTHON_PLUGINS = OUR_BSDFS | OUR_SAMPLERS | OUR_INTEGRATORS | {
     "direct_projective", "prb", "prb_basic", "prb_projective", "prbvolpath", "volprim_rf_basic",
 }  # fmt: skip
 

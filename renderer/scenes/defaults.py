@@ -26,12 +26,13 @@ class SceneDefaults:
     """
     width, height  of the film, in pixels
     max_depth      edges of the longest path (Mitsuba's count; -1: unlimited)
-    integrator     plugin name, of the inner one where the outer only adds channels
-    sampler        as people write it, NAME or NAME:key=value with the parameters that the catalog knows
+    integrator     as people write it, NAME or NAME:key=value with the parameters that the catalog knows but for
+                   max_depth; the inner one where the outer only adds channels
+    sampler        written like ``integrator``
     spp            samples per pixel, as asked (samplers may round)
     crop           x, y, width, height in pixels of the film; None: all of it
-    rfilter        written like ``sampler``; box where the file names none, whatever Mitsuba's default is: pixels then
-                   share no samples, as measuring errors wants it
+    rfilter        written like ``integrator``; box where the file names none, whatever Mitsuba's default is: pixels
+                   share no samples then, as measuring errors wants it
     """
 
     width: int = 256
@@ -69,7 +70,7 @@ def defaults_of(root: Element) -> SceneDefaults:
         width=width,
         height=height,
         max_depth=ours.max_depth if integrator is None else _integer(integrator, "max_depth", -1),
-        integrator=ours.integrator if integrator is None else integrator.attributes["type"],
+        integrator=ours.integrator if integrator is None else _written("integrator", integrator),
         sampler=ours.sampler if sampler is None else _written("sampler", sampler),
         spp=ours.spp if sampler is None else _integer(sampler, "sample_count", 4),
         crop=None if film is None else _crop(film, width, height),
@@ -86,9 +87,9 @@ def _written(axis: str, element: Element) -> str:
         return name
     given = {
         child.attributes["name"]: child.attributes.get("value", "")
-        for tag in ("boolean", "integer", "float")
+        for tag in ("boolean", "integer", "float", "string")
         for child in _children(element, tag)
-        if child.attributes.get("name") in known
+        if child.attributes.get("name") in known - {"max_depth"}
     }
     try:
         return catalog.label(axis, catalog.resolve(axis, {"type": name, **given}))

@@ -113,7 +113,8 @@ class _Machine:
         if film and film[0] != "image":
             self.report.note(film[1].place, f"the film {shown(film[0])} is unknown; it is taken as image")
         kind, given = self.options.get("Integrator", ("path", Parameters("the default integrator", start)))
-        root.append(settings.integrator(kind, given, self.report))
+        lamps = sum(1 for part in self.assembly.body for _ in part.iter("emitter"))
+        root.append(settings.integrator(kind, given, self.report, lamps=lamps))
         kind, given = self.options.get("Sampler", ("halton", Parameters("the default sampler", start)))
         parts = [settings.sampler(kind, given, self.report),
                  settings.film(film[1] if film else None, self.options.get("PixelFilter"), self.report)]  # fmt: skip

@@ -25,6 +25,7 @@ SAMPLERS = {
 }  # fmt: skip
 INTEGRATORS = {"path": "path", "volpath": "path", "bdpt": "bdpt", "directlighting": "direct", "direct": "direct",
                "whitted": "direct"}  # fmt: skip
+STRATEGIES = {"path": "spatial", "volpath": "spatial", "bdpt": "power"}  # how pbrt picks lamps unless it is told
 SIDE_MAX = 65535  # pixels; what OpenEXR pictures are made for
 
 
@@ -102,8 +103,12 @@ def sampler(kind: str, given: Parameters, report: Report) -> Xml:
     return xml.plugin("sampler", name, *parts)
 
 
-def integrator(kind: str, given: Parameters, report: Report) -> Xml:
-    """The integrator. pbrt's maxdepth counts scattering events, Mitsuba's max_depth edges: one more."""
+def integrator(kind: str, given: Parameters, report: Report, *, lamps: int) -> Xml:
+    """
+    The integrator. pbrt's maxdepth counts scattering events, Mitsuba's max_depth edges: one more.
+
+    lamps  in the scene: with one there is nothing to pick, so a file that names no light sampling strategy gets none
+    """
     name = INTEGRATORS.get(kind, "")
     if name not in catalog.entries("integrator"):
         report.note(given.place, f"the integrator {shown(kind)} is not offered; path is used")
@@ -115,14 +120,24 @@ def integrator(kind: str, given: Parameters, report: Report) -> Xml:
         raise SceneError(f"{given.place}: maxdepth = {depth}; give 0 to {catalog.MAX_DEPTH - 1}")
     if "rrthreshold" in given:
         report.note(given.place, "rrthreshold is left out: Russian roulette changes the noise, not the picture")
-    strategy = given.text("lightsamplestrategy", "uniform")
-    if strategy != "uniform" and kind in ("path", "volpath", "bdpt"):
-        report.note(
-            given.place, f"the light sample strategy {shown(strategy)} is left out: the noise changes, not the picture"
-        )
+    picking = _light_sampler(name, given, STRATEGIES.get(kind, "") if lamps > 1 else "", report)
     if "pixelbounds" in given:
         report.note(given.place, "pixelbounds are left out: a grid crops pictures")
     given.ignore("rrthreshold", "strategy", "regularize", "pixelbounds", "visualizestrategies", "visualizeweights",
                  "lightsamplestrategy")  # fmt: skip
     parts = [] if name == "direct" else [xml.value("integer", "max_depth", depth + 1)]
-    return xml.plugin("integrator", name, *parts)
+    return xml.plugin("integrator", name, *parts, picking)
+
+
+def _light_sampler(name: str, given: Parameters, default: str, report: Report) -> Xml | None:
+    """How lamps are picked, if the catalog's integrator of that name can be told so; the noise hangs on it, no more."""
+    strategy = given.text("lightsamplestrategy", default)
+    known = {parameter.name: parameter for parameter in catalog.find("integrator", name).parameters}
+    offered = known["light_sampler"].options if "light_sampler" in known else ()
+    if strategy in offered:
+        return xml.value("string", "light_sampler", strategy)
+    if "lightsamplestrategy" in given:
+        report.note(
+            given.place, f"the light sample strategy {shown(strategy)} is left out: the noise changes, not the picture"
+        )
+    return None

@@ -160,6 +160,14 @@ def test_defaults_are_what_the_file_says(write: Write) -> None:
     assert find(str(write("")), Path("/")).defaults == SceneDefaults(256, 256, 6, "path", "independent", 16)
 
 
+def test_an_integrator_keeps_its_parameters(write: Write) -> None:
+    """As people write them; max_depth stands alone, since it can be said alone."""
+    body = """<integrator type="path"><integer name="max_depth" value="9"/><integer name="rr_depth" value="3"/>
+        <boolean name="hide_emitters" value="true"/></integrator>"""
+    defaults = find(str(write(body)), Path("/")).defaults
+    assert (defaults.integrator, defaults.max_depth) == ("path:hide_emitters=true,rr_depth=3", 9)
+
+
 def test_crop_and_filter_are_what_the_file_says(write: Write) -> None:
     """Box where it is silent, whatever Mitsuba has by default; a crop without a width is as wide as the film."""
     film = """<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="100"/>

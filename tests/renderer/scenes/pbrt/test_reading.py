@@ -16,6 +16,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
+from renderer import catalog
+from renderer.catalog import Entry, Parameter
 from renderer.errors import DartboardError, SceneError
 from renderer.scenes.pbrt import lexer, meshes, noise, parser, ply, spectra
 from renderer.scenes.pbrt.convert import convert
@@ -112,6 +114,61 @@ def test_filters_are_defaults(scenes: Scenes, line: str, rfilter: str, words: st
     assert all(words in note and "line 4" in note for note in source.notes) and bool(source.notes) == bool(words)
 
 
+TWO_LAMPS = 'LightSource "point" LightSource "distant"'
+
+
+@pytest.mark.parametrize(
+    ("line", "world", "integrator", "words"),
+    [
+        ('path" "string lightsamplestrategy" "power"', "", "path:light_sampler=power", ""),
+        ('volpath" "string lightsamplestrategy" "spatial"', "", "path:light_sampler=spatial", "volpath"),
+        ('path" "string lightsamplestrategy" "uniform"', TWO_LAMPS, "path", ""),
+        ('path" "string lightsamplestrategy" "magic"', TWO_LAMPS, "path", "'magic' is left out"),
+        ('path"', TWO_LAMPS, "path:light_sampler=spatial", ""),
+        ('path"', 'LightSource "point"', "path", ""),
+        ('bdpt"', TWO_LAMPS, "bdpt:light_sampler=power", ""),
+        ('directlighting"', TWO_LAMPS, "direct", ""),
+    ],
+)
+def test_how_lamps_are_picked_is_a_default(
+    scenes: Scenes, monkeypatch: pytest.MonkeyPatch, line: str, world: str, integrator: str, words: str
+) -> None:
+    """pbrt's own default where there is a choice and the file does not say; nothing that the catalog does not offer."""
+    _offer(monkeypatch, Parameter("light_sampler", str, "uniform", "", options=("uniform", "power", "spatial")))
+    source = scenes(world, options=f'Integrator "{line}')
+    assert source.defaults.integrator == integrator
+    assert any(words in note for note in source.notes) if words else not source.notes
+
+
+def test_a_catalog_without_light_samplers(scenes: Scenes, monkeypatch: pytest.MonkeyPatch) -> None:
+    _offer(monkeypatch)
+    source = scenes(TWO_LAMPS, options='Integrator "path" "string lightsamplestrategy" "power"')
+    assert source.defaults.integrator == "path"
+    assert ["line 1" in note and "'power' is left out" in note for note in source.notes] == [True]
+    assert scenes(TWO_LAMPS, options='Integrator "path"').notes == ()
+
+
+def test_a_scene_for_bdpt_loads(scenes: Scenes, monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
+    """What draws it is the catalog's business; the scene names it, no more."""
+    from renderer.scenes.load import load
+
+    _offer(monkeypatch)
+    source = scenes(MESH, options='Integrator "bdpt"')
+    assert source.defaults.integrator == "bdpt" and load(source.folder, source.main, width=8, height=8).scene.shapes()
+
+
+def _offer(monkeypatch: pytest.MonkeyPatch, *parameters: Parameter) -> None:
+    """A catalog whose path and bdpt have these parameters and max_depth."""
+    depth = Parameter("max_depth", int, None, "", estimand=True)
+    known = {
+        name: Entry("integrator", name, "", "", name, parameters=(depth, *parameters)) for name in ("path", "bdpt")
+    }
+    entries = catalog.entries
+    monkeypatch.setattr(
+        catalog, "entries", lambda axis: {**entries(axis), **known} if axis == "integrator" else entries(axis)
+    )
+
+
 # Of pbrt-v3's src/filters, along one axis and for its defaults, but the sinc's, which is Mitsuba's where τ is the radius.
 ALONG = {
     "triangle": lambda x: np.maximum(0, 2 - x),
@@ -124,8 +181,6 @@ ALONG = {
 @pytest.mark.parametrize("kind", ALONG)
 def test_filters_are_the_same_functions(scenes: Scenes, variant: str, kind: str) -> None:
     import mitsuba as mi
-
-    from renderer import catalog
 
     text = kind if '"' in kind else kind + '" "float xwidth" 2'
     choice = catalog.resolve("rfilter", scenes("", options=f'PixelFilter "{text}').defaults.rfilter)
