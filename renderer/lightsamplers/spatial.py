@@ -24,7 +24,7 @@ from renderer.lightsamplers.rows import Rows, running_sums
 RESOLUTION = 64  # voxels along the longest side
 POINTS = 32  # in a voxel, for each lamp; pbrt has 128, but the same time is better spent on smaller voxels
 TABLE_BYTES = 64 * 2**20  # of all voxels together
-EVALUATIONS = 2**26  # of a lamp at a point, all together: half a second on two cores
+EVALUATIONS = 2**25  # of a lamp at a point, all together: a quarter of a second on two cores
 CHUNK = 2**23  # evaluations at once: 32 MB
 DEFENSIVE = 0.1  # of the probability goes by power
 

@@ -200,6 +200,26 @@ def test_light_samplers_of_a_scene_are_made_once_for_each_state_of_it() -> None:
     assert second.pmf(None, None, mi.UInt32(0))[0] < before / 2
 
 
+@pytest.mark.parametrize("name", [name for name in NAMES if name != "uniform"])
+def test_a_sweep_leaks_into_no_other_cell(name: str, load_for: Callable[..., Any]) -> None:
+    """A lamp made bright for one cell is picked more often in that cell alone."""
+    from tests.renderer.conftest import make_cell
+
+    loaded = load_for(make_cell("many_lights", size=(8, 8)), "many_lights")
+    bright = (("lamp_00.emitter.radiance", 1e4),)
+
+    def cell(sweep: tuple[tuple[str, float], ...]) -> NDArray[np.float64]:
+        loaded.settings.apply(sweep)
+        tracer = integrator(name)
+        tracer.use(loaded.scene, loaded.lights.get(name, sweep))
+        return pictures(loaded.scene, tracer, 16)
+
+    before, swept, after = cell(()), cell(bright), cell(())
+    assert np.array_equal(before, after) and swept.mean() > before.mean()
+    loaded.settings.apply(bright)
+    assert np.array_equal(swept, pictures(loaded.scene, integrator(name), 16))
+
+
 # -- expectation and variance ----------------------------------------------------------------------------------
 
 
@@ -241,6 +261,21 @@ def test_means_are_equal_in_the_corridor(name: str, corridor: Any) -> None:
     if name in ("spatial", "bvh"):
         ratio = native.var(0, ddof=1).mean() / ours.var(0, ddof=1).mean()
         assert ratio > 5, ratio
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("spp, count", [(16, 32), (64, 16)])
+def test_spatial_has_a_fifteenth_of_the_variance(spp: int, count: int, variant: str) -> None:
+    """Of uniform's, in the corridor, by the mean over its pixels."""
+    from renderer.scenes.load import load
+    from renderer.scenes.sources import find
+
+    source = find("many_lights", Path())
+    scene = load(source.folder, source.main, width=128, height=128).scene
+    uniform, spatial, tree = (
+        pictures(scene, integrator(name), spp, count).var(0, ddof=1).mean() for name in ("uniform", "spatial", "bvh")
+    )
+    assert uniform > 15 * spatial and uniform > 15 * tree, (uniform / spatial, uniform / tree)
 
 
 SPECTRAL = """
