@@ -11,6 +11,8 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +42,7 @@ def scenes_of(grid: Table, names: Mapping[str, str], integrators: Sequence[Choic
     own = _own_settings(grid, names)
     scenes = [_scene(name, place, find, own.get(name), common) for name, place in names.items()]
     found = [scene for scene in scenes if scene]
+    _check_depths(grid, found, integrators)
     _check_references(grid, found, integrators)
     _check_twins(grid, found)
     return found
@@ -235,8 +238,16 @@ def _reference(source: sources.SceneSource, common: _Settings, own: _Settings | 
     return ReferenceRequest(spp=spp or asked, asked=asked, **fields)
 
 
+def _check_depths(grid: Table, scenes: Iterable[SceneRequest], integrators: Sequence[Choice]) -> None:
+    """Some integrators keep their paths, and have room for so many vertices."""
+    for scene, integrator in product(scenes, integrators):
+        where = f"{scene.source.name} in {grid.where}"
+        depth = path_lengths(integrator, scene.max_depth)
+        grid.problems.attempt(partial(catalog.check_depth, integrator, depth, where))
+
+
 def _check_references(grid: Table, scenes: Iterable[SceneRequest], integrators: Sequence[Choice]) -> None:
-    """A reference has to count the same paths as the cells that it serves."""
+    """A reference has to count the same paths as the cells that it serves, and take paths as long."""
     for scene in scenes:
         if scene.reference is None:
             continue
@@ -244,6 +255,13 @@ def _check_references(grid: Table, scenes: Iterable[SceneRequest], integrators: 
         fixed = catalog.find("integrator", reference).depth
         for integrator in integrators:
             depth = path_lengths(integrator, scene.max_depth)
+            where = f"{scene.source.name} in {grid.where}"
+            grid.problems.attempt(partial(catalog.check_depth, scene.reference.integrator, depth, where))
+            if catalog.strategy(integrator) and reference != "bdpt":
+                grid.problems.add(
+                    f"{integrator.name} in {grid.where} draws one strategy, for which {reference} is no reference: "
+                    'write reference = false, or [reference] with integrator = "bdpt"'
+                )
             if fixed not in (None, depth):
                 grid.problems.add(
                     f"the reference of {scene.source.name} in {grid.where} is {reference}, which renders paths of "

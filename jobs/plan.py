@@ -145,6 +145,7 @@ def _estimand(
         hide_emitters=bool(dict(integrator.parameters).get("hide_emitters", False)),
         rfilter=scene.rfilter,
         colour=grid.colour,
+        strategy=catalog.strategy(integrator),
         sweep=sweep,
     )
 

@@ -3,7 +3,7 @@ The catalog: every value an axis can take, with its parameters, defaults, units 
 
 The command line, the grid file, the REST interface and the docs all read this one list, and it turns what
 people type (``stratified:jitter=false``, ``random``) into a fully resolved ``Choice``. It names Mitsuba's
-plugins but never imports them, so checking a grid takes no renderer. Samplers have a file of their own.
+plugins but never imports them, so checking a grid takes no renderer. Samplers and integrators have files of their own.
 """
 
 from __future__ import annotations
@@ -12,31 +12,22 @@ from collections.abc import Mapping
 from functools import cache, lru_cache
 from typing import Any
 
+from renderer.catalog_integrators import INTEGRATORS, MAX_DEPTH
 from renderer.catalog_samplers import IGNORE_SPP, IGNORED_SPP, MITSUBA, SAMPLERS
 from renderer.catalog_types import Entry, Parameter, to_text
 from renderer.errors import BadParameter, DartboardError, UnknownName, shown
 from renderer.spec import Choice
 
-__all__ = ["Entry", "Parameter"]
+__all__ = ["MAX_DEPTH", "Entry", "Parameter"]
 
 MAX_SPP = 10**7  # more is refused: a typo, not an experiment
-MAX_DEPTH = 10**6  # edges; fits Mitsuba's 32-bit integers, and no light survives as many
 COLOURS = ("rgb", "spectral")
 POINTS = "points"  # a parameter that nobody writes: the digest of a point file, put into a choice when the file is read
 
 
-_DEPTH = Parameter("max_depth", int, None, "edges of the longest path; -1 is unlimited", "edges", -1, MAX_DEPTH,
-                   banned=(0,), estimand=True)  # fmt: skip
-_HIDE = Parameter("hide_emitters", bool, False, "lamps are not seen directly", estimand=True)
-
 _ENTRIES = (
     *SAMPLERS,
-    Entry("integrator", "path", "path tracing with next-event estimation and multiple importance sampling", MITSUBA,
-          "path", parameters=(_DEPTH, _HIDE,
-                              Parameter("rr_depth", int, 5, "edges before Russian roulette", "edges", 1, MAX_DEPTH))),
-    Entry("integrator", "direct", "direct light only: paths of at most two edges", MITSUBA, "direct", depth=2,
-          parameters=(_HIDE, Parameter("emitter_samples", int, 1, "light samples per camera ray", "", 1, 1024),
-                      Parameter("bsdf_samples", int, 1, "BSDF samples per camera ray", "", 1, 1024))),
+    *INTEGRATORS,
     Entry("rfilter", "box", "a pixel is the mean of its own area: pixels stay independent", MITSUBA, "box"),
     Entry("rfilter", "tent", "linear falloff", MITSUBA, "tent",
           parameters=(Parameter("radius", float, 1.0, "support", "pixels", 0.5, 16),)),
@@ -79,7 +70,10 @@ def resolve(axis: str, value: str | Mapping[str, Any], where: str = "") -> Choic
     for key, parameter in known.items():
         if parameter.required and key not in given:
             raise BadParameter(f"{place} needs {key}, {parameter.line}; write {entry.name}:{key}=…")
-    resolved = {key: item for key, item in values.items() if item is not None}
+    resolved = {
+        key: item for key, item in values.items()
+        if item is not None and not (known[key].late and item == known[key].default)
+    }  # fmt: skip
     entry.check(resolved, place)
     return Choice(entry.name, entry.version, tuple(sorted(resolved.items())))
 
@@ -145,6 +139,23 @@ def rendered_spp(sampler: Choice, asked: int, where: str = "spp") -> int:
         )
     entry.check_spp(values, rendered, where)
     return rendered
+
+
+def check_depth(integrator: Choice, max_depth: int, where: str) -> None:
+    """Raises ``BadParameter`` for a max_depth that this integrator does not take."""
+    deepest = find("integrator", integrator.name).deepest
+    if deepest is not None and not 1 <= max_depth <= deepest:
+        raise BadParameter(
+            f"{integrator.name} takes a max_depth from 1 to {deepest}, and {where} has {max_depth}; "
+            "set max_depth there, or take path, which goes as deep as you like"
+        )
+
+
+def strategy(integrator: Choice) -> str:
+    """``Estimand.strategy`` of an integrator that draws one strategy alone; empty for all others."""
+    values = dict(integrator.parameters)
+    pair = str(values.get("debug_strategy", ""))
+    return pair + " alone" * (pair != "" and not values["debug_weighted"])
 
 
 def as_json() -> dict[str, list[dict[str, Any]]]:

@@ -28,7 +28,10 @@ class Parameter:
     meanings  a line for each option
     replays   options that show a published mistake: with one of them a sampler is a *replay*, and never recommended
     required  True if nothing can be done without it
+    reader    for values of a form of their own: the text they come to, None for what is not allowed
+    form      what a reader allows, in words
     unset     what a default of None comes to, in a few words
+    late      its default is left out of a choice: it came later, and what was drawn before keeps its digest
     """
 
     name: str
@@ -45,13 +48,18 @@ class Parameter:
     replays: tuple[str, ...] = ()
     required: bool = False
     unset: str = "as the scene"
+    reader: Callable[[object], str | None] | None = None
+    form: str = ""
+    late: bool = False
 
     def read(self, value: object, where: str) -> Scalar:
         """``value`` (as TOML, JSON or text after ``=``) as this parameter's type; ``BadParameter`` otherwise."""
         read: Scalar | None = None
         if isinstance(value, str) and self.kind is not str:
             value = _from_text(value)
-        if self.kind is bool:
+        if self.reader:
+            read = self.reader(value)
+        elif self.kind is bool:
             read = value if isinstance(value, bool) else None
         elif self.kind is int and not isinstance(value, bool):
             read = int(value) if isinstance(value, (int, float)) and value == value // 1 else None
@@ -69,6 +77,8 @@ class Parameter:
     @property
     def allowed(self) -> str:
         """The range in words: ``an integer from 1 to 64``."""
+        if self.form:
+            return self.form
         if self.options:
             return f"one of {', '.join(filter(None, self.options))}{', or left out' * ('' in self.options)}"
         words = {bool: "true or false", int: "an integer", float: "a number", str: "a text"}[self.kind]
@@ -103,6 +113,7 @@ class Entry:
     check      raises ``BadParameter`` for parameters that do not go together; told them and their place
     check_spp  samplers only: the same for parameters and the spp that is rendered
     depth      integrators only: the max_depth it always renders, None where it takes any
+    deepest    integrators only: the largest max_depth that it takes, None where it takes any and none
     """
 
     axis: str
@@ -119,6 +130,7 @@ class Entry:
     check: Callable[[Values, str], None] = _anything
     check_spp: Callable[[Values, int, str], None] = _any_spp
     depth: int | None = None
+    deepest: int | None = None
 
 
 def _finite(value: float) -> float | None:

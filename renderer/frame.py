@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -33,12 +34,22 @@ class PassSum:
     sums: tuple[Any, Any, Any]
     weight: Any | float
 
+    def with_splats(self, splats: Splats) -> PassSum:
+        """With light that arrived at other pixels than its lane's: it counts like the lane's own, filter and all."""
+        red, green, blue = (own + other for own, other in zip(self.sums, splats.channels(), strict=True))
+        sums = red, green, blue
+        dr.schedule(sums)
+        return PassSum(sums, self.weight)
+
     def read(self) -> tuple[NDArray[np.float64], NDArray[np.float64] | float]:
         """Wait for the pass: sums as (width·height, 3), weights as (width·height, 1) or a constant."""
         sums = np.stack([channel.numpy() for channel in self.sums], axis=-1).astype(np.float64)
         if isinstance(self.weight, float):
             return sums, self.weight
         return sums, self.weight.numpy().astype(np.float64)[:, None]
+
+
+EVEN = 16  # samples along a pixel's side, where weights of a filter are summed
 
 
 class Frame:
@@ -49,11 +60,12 @@ class Frame:
     """
 
     def __init__(self, loaded: LoadedScene, samples: int, spp: int):
-        self.scene, self.sensor = loaded.scene, loaded.sensor
+        self.scene, self.sensor, self.lights = loaded.scene, loaded.sensor, loaded.lights
         film = self.sensor.film()
         self.film_size = tuple(int(n) for n in film.size())
         self.width, self.height = (int(n) for n in film.crop_size())
-        self.offset = tuple(int(n) for n in film.crop_offset())
+        x, y = (int(n) for n in film.crop_offset())
+        self.offset = x, y
         self.samples = samples
         self.diff_scale = 1 / math.sqrt(spp)
         rfilter = film.rfilter()
@@ -93,7 +105,7 @@ class Frame:
 
         Starts the computation: everything that hangs on the lanes is evaluated once, here.
         """
-        rgb = mi.xyz_to_srgb(mi.spectrum_to_xyz(light, wavelengths)) if mi.is_spectral else light
+        rgb = _rgb(light, wavelengths)
         if self.rfilter is None:
             # Reductions evaluate their own input: without this the pass would be traced once per channel.
             dr.eval(rgb)
@@ -105,3 +117,54 @@ class Frame:
         channels = dr.unravel(mi.Vector4f, block.tensor().array)
         dr.eval(channels)
         return PassSum((channels.x, channels.y, channels.z), channels.w)
+
+    def from_splats(self, splats: Splats) -> PassSum:
+        """The pass of an integrator that has no camera samples: divided by what theirs would sum to."""
+        channels = splats.channels()
+        dr.eval(channels)
+        return PassSum(channels, float(self.samples) if self.rfilter is None else self._even_weights * self.samples)
+
+    @cached_property
+    def _even_weights(self) -> Any:
+        """The sum of filter weights in each pixel, for samples as dense as one a pixel: less at the film's edge."""
+        count = self.width * self.height * EVEN**2
+        number = dr.arange(mi.UInt32, count)
+        row, column = number // (self.width * EVEN), number % (self.width * EVEN)
+        block = _block(self, 1)
+        at = (mi.Vector2f(mi.Float(column), mi.Float(row)) + 0.5) / EVEN + mi.Vector2f(*self.offset)
+        block.put(mi.Point2f(at), [mi.Float(1 / EVEN**2)], mi.Bool(True))
+        return dr.opaque(mi.Float, 0) + block.tensor().array
+
+
+class Splats:
+    """
+    Light of one pass that lands anywhere on the film: put into the pixels of ``frame`` with its filter.
+
+    A splat is the light of one of the pass's lanes. Filter weights are not collected: the camera's samples, as many and
+    spread as evenly, have the same expected sum of them, and their sums are what a pixel is divided by.
+
+    block  an image block of Mitsuba's, with channels for red, green, blue and a weight that is not used
+    """
+
+    def __init__(self, frame: Frame):
+        self.block = _block(frame, 4)
+
+    def put(self, position: Any, light: Any, wavelengths: Any, active: Any) -> None:
+        """Add ``light`` (a spectrum per lane) at ``position``, in pixels of the film, inside of the frame's window."""
+        rgb = _rgb(light, wavelengths)
+        self.block.put(position, [rgb.x, rgb.y, rgb.z, mi.Float(0)], active)
+
+    def channels(self) -> tuple[Any, Any, Any]:
+        """Three arrays of width·height values."""
+        channels = dr.unravel(mi.Vector4f, self.block.tensor().array)
+        return channels.x, channels.y, channels.z
+
+
+def _block(frame: Frame, channels: int) -> Any:
+    # Not coalesced: splats of neighbouring lanes have nothing to do with each other.
+    size, offset = [frame.width, frame.height], list(frame.offset)
+    return mi.ImageBlock(size, offset, channels, frame.rfilter, coalesce=False)
+
+
+def _rgb(light: Any, wavelengths: Any) -> Any:
+    return mi.xyz_to_srgb(mi.spectrum_to_xyz(light, wavelengths)) if mi.is_spectral else light

@@ -39,6 +39,14 @@ def bsdfs() -> Mapping[str, Any]:
     return {"anisophong": AnisoPhong}
 
 
+def integrators() -> Mapping[str, Any]:
+    """Name → class of our integrators. Imported here, not before: they derive from the variant that is set."""
+    from renderer.integrators.bdpt_integrator import BDPT
+    from renderer.integrators.path_lights import PathLights
+
+    return {"path_lights": PathLights, "bdpt": BDPT}
+
+
 def register_all() -> None:
     """Make our plugins known to the variant that is set."""
     import mitsuba as mi
@@ -47,3 +55,5 @@ def register_all() -> None:
         mi.register_sampler(name, plugin)
     for name, plugin in bsdfs().items():
         mi.register_bsdf(name, plugin)
+    for name, plugin in integrators().items():
+        mi.register_integrator(name, plugin)

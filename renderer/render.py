@@ -10,7 +10,7 @@ full spp. Sums are kept in float64 on the host, one pass behind the device, so n
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -23,9 +23,9 @@ from numpy.typing import NDArray
 from renderer import catalog
 from renderer.errors import BadParameter
 from renderer.frame import Frame, PassSum
-from renderer.integrators.adapter import adapter
+from renderer.integrators.adapter import IntegratorAdapter, adapter
 from renderer.scenes.load import LoadedScene
-from renderer.spec import CellSpec, Choice
+from renderer.spec import CellSpec, Choice, stream_seed
 
 # Aimed at, about 340 MB of wavefront: 16 samples per pixel of a 512×512 picture, so that the lanes of one SIMD packet
 # start in one pixel and stay together. 2**20 (4 samples) is up to 7 % slower; 2**24 no faster, with passes of seconds.
@@ -93,21 +93,28 @@ def render(
     width, height = spec.estimand.size
     k = samples_per_pass(width * height, spec.spp)
     frame = Frame(loaded, k, spec.spp)
-    integrator, sampler = adapter(spec), make_sampler(spec.sampler, spec.spp, points)
+    integrator = adapter(spec, frame)
+    samplers = [make_sampler(spec.sampler, spec.spp, points) for _ in range(integrator.streams)]
     for replicate, seed in enumerate(seeds):
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
             dr.kernel_history_clear()
             start = time.perf_counter()
-            picture = _draw(frame, integrator, sampler, seed, spec.spp // k, replicate, on_pass)
+            picture = draw(frame, integrator, samplers, seed, spec.spp // k, replicate, on_pass)
             seconds = time.perf_counter() - start
             compiled = _compile_seconds()
         yield Rendering(replicate, seed, picture, max(seconds - compiled, 0.0), compiled)
 
 
-def _draw(
-    frame: Frame, integrator: Any, sampler: Any, seed: int, passes: int, replicate: int, on_pass: Callable[..., None]
+def draw(
+    frame: Frame,
+    integrator: IntegratorAdapter,
+    samplers: Sequence[Any],
+    seed: int,
+    passes: int,
+    replicate: int = 0,
+    on_pass: Callable[[Progress], None] = lambda progress: None,
 ) -> NDArray[np.float32]:
-    """All passes of one replicate."""
+    """All passes of one replicate, as ``render`` does it: (H, W, 3) float32."""
     total = np.zeros((frame.height * frame.width, 3))
     weight: Any = np.zeros((frame.height * frame.width, 1))
     start = time.perf_counter()
@@ -126,15 +133,19 @@ def _draw(
     def report(done: int) -> None:
         on_pass(Progress(replicate, done, passes, time.perf_counter() - start, picture))
 
-    sampler.set_samples_per_wavefront(frame.samples)
+    for number, sampler in enumerate(samplers):
+        sampler.set_samples_per_wavefront(frame.samples)
+        if hasattr(sampler, "stream"):
+            sampler.stream(number, len(samplers))
     under_way: PassSum | None = None
     for index in range(passes):
-        _tell_frame(sampler, frame, index * frame.samples)
-        if index == 0:
-            sampler.seed(seed, frame.lanes)
-        else:
-            sampler.advance()
-        launched = integrator.render_pass(frame, sampler)
+        for number, sampler in enumerate(samplers):
+            _tell_frame(sampler, frame, index * frame.samples)
+            if index == 0:
+                sampler.seed(stream_seed(seed, number), frame.lanes)
+            else:
+                sampler.advance()
+        launched = integrator.render_pass(frame, samplers)
         if under_way is not None:
             add(under_way)
             report(index)

@@ -89,6 +89,8 @@ class Estimand:
     hide_emitters  True: lamps are not seen directly
     rfilter        reconstruction filter
     colour         "rgb" or "spectral"
+    strategy       "s-t": only paths made of s vertices from a lamp and t from the camera, each by its weight;
+                   "s-t alone": in full. Empty: all of them
     sweep          sorted (parameter, value) pairs that this cell sets in the scene, colours as tuples
     """
 
@@ -100,6 +102,7 @@ class Estimand:
     crop: tuple[int, int, int, int] | None = None
     hide_emitters: bool = False
     colour: str = "rgb"
+    strategy: str = ""
     sweep: tuple[tuple[str, Any], ...] = ()
 
     @cached_property
@@ -116,6 +119,7 @@ class Estimand:
                 "scene": self.scene,
                 "sweep": dict(self.sweep),
                 "width": self.width,
+                **({"strategy": self.strategy} if self.strategy else {}),  # a debugging aid: no name for its absence
             }
         )
 
@@ -186,3 +190,14 @@ def seed(digest: str, replicate: int, *, reference: bool = False) -> int:
     """
     bits = int.from_bytes(hashlib.sha256(f"{digest}:{replicate}".encode("ascii")).digest()[:4], "big")
     return bits >> (32 - SEED_BITS) | (int(reference) << SEED_BITS)
+
+
+def stream_seed(seed: int, number: int) -> int:
+    """
+    The seed of sampler ``number`` of the same lanes: integrators that trace two subpaths draw them from two samplers.
+
+    The first is the cell's own; the others are hashed, so that no two differ by a multiple of spp on purpose.
+    """
+    if number == 0:
+        return seed
+    return int.from_bytes(hashlib.sha256(f"{seed}/{number}".encode("ascii")).digest()[:4], "big")

@@ -119,7 +119,9 @@ def cell(
         source.digest, width, height, depth, _choice("rfilter", rfilter, defaults.rfilter, source.name),
         _crop(crop, width, height) if crop else defaults.crop_at(width, height),
         hide_emitters=bool(parameters.get("hide_emitters", False)),
+        strategy=catalog.strategy(how),
     )  # fmt: skip
+    catalog.check_depth(how, depth, source.name)
     how = Choice(how.name, how.version, tuple(pair for pair in how.parameters if pair[0] not in moved))
     return CellSpec(estimand, how, drawing, catalog.rendered_spp(drawing, asked, "--spp"))
 

@@ -123,8 +123,3 @@ def radical_inverses(count: int, dimensions: int) -> NDArray[np.float64]:
             left, digit = np.divmod(left, base)
             points[:, dimension] += digit * weight
     return points % 1
-
-
-def floats_on_device(values: Any) -> Any:
-    """An array of numbers as memory of Dr.Jit's own, float32 (``on_device`` says why)."""
-    return dr.reinterpret_array(mi.Float, on_device(np.ascontiguousarray(values, np.float32).view(np.uint32)))

@@ -17,11 +17,11 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.lightsamplers.base import ONE_BELOW, LightSampler, floats_on_device, radical_inverses
+from renderer.lightsamplers.base import ONE_BELOW, LightSampler, radical_inverses
 from renderer.lightsamplers.power import CHUNK, power_pmf
 from renderer.lightsamplers.rows import Rows, running_sums
 from renderer.lightsamplers.tree import Lamps, Tree, build
-from renderer.samplers.bits import on_device
+from renderer.samplers.bits import floats_on_device, on_device
 
 POINTS = 64  # of a lamp, for its cone of normals
 FLOOR = 0.02  # of a node's importance does not depend on directions

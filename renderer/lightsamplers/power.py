@@ -16,8 +16,9 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.lightsamplers.base import LightSampler, floats_on_device, radical_inverses
+from renderer.lightsamplers.base import LightSampler, radical_inverses
 from renderer.lightsamplers.rows import Rows, running_sums
+from renderer.samplers.bits import floats_on_device
 
 POINTS = 1024  # rays a lamp; RGB lamps in a spectral variant scatter by 10 % about the mean, a spot's edge by 60 %
 CHUNK = 2**22  # lanes at once

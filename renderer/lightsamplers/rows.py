@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from renderer.errors import SceneError
-from renderer.lightsamplers.base import ONE_BELOW, floats_on_device
+from renderer.lightsamplers.base import ONE_BELOW
+from renderer.samplers.bits import floats_on_device
 
 UNITS = 2**23
 

@@ -17,9 +17,10 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from renderer.lightsamplers.base import LightSampler, floats_on_device, radical_inverses
+from renderer.lightsamplers.base import LightSampler, radical_inverses
 from renderer.lightsamplers.power import lit_point, power_pmf
 from renderer.lightsamplers.rows import Rows, running_sums
+from renderer.samplers.bits import floats_on_device
 
 RESOLUTION = 64  # voxels along the longest side
 POINTS = 32  # in a voxel, for each lamp; pbrt has 128, but the same time is better spent on smaller voxels

@@ -82,6 +82,12 @@ class PixelSampler(mi.Sampler):
         """Film size and crop in pixels, and the samples of each pixel that the next pass draws."""
         self.picture = Picture(width, height, crop, spp_per_pass, first_sample)
 
+    def stream(self, number: int, of: int) -> None:
+        """
+        Told that this is sampler ``number`` of several that serve the same lanes, seeded differently. Nothing to do
+        where a seed makes all dimensions new.
+        """
+
     def seed(self, seed: Any, wavefront_size: int = 2**32 - 1) -> None:
         if wavefront_size >= 2**31:
             raise RuntimeError(

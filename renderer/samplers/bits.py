@@ -69,6 +69,13 @@ def on_device(values: NDArray[np.uint32]) -> Any:
     return table
 
 
+def floats_on_device(values: Any) -> Any:
+    """The same for an array of numbers, as float32."""
+    table = dr.reinterpret_array(mi.Float, on_device(np.ascontiguousarray(values, np.float32).view(np.uint32)))
+    dr.eval(table)
+    return table
+
+
 def unit(fraction: Any) -> Any:
     """A 0.32 fixed-point fraction as a float in [0, 1): 24 bits are kept, so it is never rounded up to 1."""
     return mi.Float(fraction >> 8) * 2**-24

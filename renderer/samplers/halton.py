@@ -43,6 +43,7 @@ class Halton(PixelSampler):
     def __init__(self, props: mi.Properties):
         super().__init__(props)
         self.digits: Any = None  # Digits, once it is prepared
+        self.turn = 0, 1
 
     def prepare(self) -> None:
         if self.picture is None:
@@ -56,14 +57,23 @@ class Halton(PixelSampler):
             self.digits = digits(self.sample_count())
 
     def adopt(self, other: Any) -> None:
-        self.digits = other.digits
+        self.digits, self.turn = other.digits, other.turn
+
+    def stream(self, number: int, of: int) -> None:
+        """Samplers of the same lanes take turns: two bases each, so that no base serves two dimensions of a path."""
+        self.turn = number, of
 
     def fraction_1d(self, lanes: Lanes, dimension: Any) -> Any:
-        return self._inverse(lanes, self.ones + self.twos * 2)
+        return self._inverse(lanes, self._number(self.ones + self.twos * 2))
 
     def fraction_2d(self, lanes: Lanes, dimension: Any) -> tuple[Any, Any]:
         number = self.ones + self.twos * 2
-        return self._inverse(lanes, number), self._inverse(lanes, number + 1)
+        return self._inverse(lanes, self._number(number)), self._inverse(lanes, self._number(number + 1))
+
+    def _number(self, number: Any) -> Any:
+        """The base of this sampler's dimension ``number``."""
+        turn, of = self.turn
+        return number if of == 1 else ((number >> 1) * of + turn) * 2 + (number & 1)
 
     def _inverse(self, lanes: Lanes, number: Any) -> Any:
         """The scrambled radical inverse of each lane's index in the base of dimension ``number``."""

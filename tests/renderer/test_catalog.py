@@ -21,6 +21,7 @@ PARAMETERS = [(entry, parameter) for entry in ENTRIES for parameter in entry.par
 SAMPLERS = [entry for entry in ENTRIES if entry.axis == "sampler"]
 MITSUBAS = [entry for entry in SAMPLERS if entry.source.startswith("Mitsuba")]
 TAKEN = [pair for pair in PARAMETERS if pair[1].name != "file"]  # the plugin is told the path of a snapshot instead
+EXAMPLES = {"debug_strategy": ("0-2", "2-1", "60-7")}  # of parameters that have a form of their own
 LARGE = [1000, 1023, 1024, 1025, 4095, 4096, 4097, 10_000, 65_536, 99_999, 10**6, 3 * 10**6, 9_998_244]
 
 
@@ -43,9 +44,15 @@ def named(items):
 
 def extremes(parameter):
     """Default, minimum, maximum and options of a parameter, those that there are, as its type."""
-    given = (parameter.default, parameter.minimum, parameter.maximum, *parameter.options)
+    examples = EXAMPLES.get(parameter.name, ())
+    given = (parameter.default, parameter.minimum, parameter.maximum, *parameter.options, *examples)
     allowed = [value for value in given if value is not None and value not in parameter.banned]
     return [parameter.kind(value) for value in allowed] or [parameter.kind()]
+
+
+def plugin(entry, parameter):
+    """The plugin that takes the parameter: paths whose lamps are picked are traced by one of ours."""
+    return "path_lights" if (entry.name, parameter.name) == ("path", "light_sampler") else entry.plugin
 
 
 def spelled(entry):
@@ -84,7 +91,7 @@ def test_our_samplers_render_every_spp_that_is_asked(mi, entry):
 @pytest.mark.parametrize(("entry", "parameter"), **named(TAKEN))
 def test_mitsuba_takes_every_parameter_over_its_whole_range(mi, entry, parameter):
     for value in extremes(parameter):
-        mi.load_dict({"type": entry.plugin, parameter.name: value})
+        mi.load_dict({"type": plugin(entry, parameter), parameter.name: value})
 
 
 @pytest.mark.parametrize(("entry", "parameter"), **named(TAKEN))
@@ -92,7 +99,7 @@ def test_a_parameter_survives_the_digest_text(mi, entry, parameter):
     """Canonical text turns 1.0 into 1; Mitsuba takes that too."""
     for value in extremes(parameter):
         choice = Choice.of(json.loads(Choice(entry.name, 1, ((parameter.name, value),)).text))
-        mi.load_dict({"type": entry.plugin, **dict(choice.parameters)})
+        mi.load_dict({"type": plugin(entry, parameter), **dict(choice.parameters)})
 
 
 @pytest.mark.parametrize("entry", **named(ENTRIES))
@@ -133,7 +140,7 @@ def chosen(draw):
             bool: st.booleans(),
             int: st.integers(**bounds).filter(lambda value, banned=parameter.banned: value not in banned),
             float: st.floats(**bounds).filter(lambda value, banned=parameter.banned: value not in banned),
-            str: st.sampled_from(parameter.options) if parameter.options else st.sampled_from(["my.npz", "a b=:é.npz"]),
+            str: st.sampled_from(parameter.options or EXAMPLES.get(parameter.name) or ["my.npz", "a b=:é.npz"]),
         }
         if parameter.required or draw(st.booleans()):
             values[parameter.name] = draw(kinds[parameter.kind])
@@ -169,7 +176,7 @@ def test_a_label_shows_only_what_differs_from_the_default():
     ("axis", "value", "words"),
     [
         ("sampler", "stratifed", ["stratifed", "grid.toml", "known: ", "did you mean 'stratified'"]),
-        ("integrator", "bdpd", ["bdpd", "integrator", "known: direct, path"]),
+        ("integrator", "bdpd", ["bdpd", "integrator", "known: bdpt, direct, path", "did you mean 'bdpt'"]),
         ("sampler", "stratified:jiter=true", ["jiter", "stratified", "known: jitter"]),
         ("sampler", "independent:jitter=true", ["jitter", "known: none"]),
         ("sampler", "poissondisk:distance=0.1", ["distance", "known: lloyd_iterations, min_dist, replay"]),
@@ -310,3 +317,41 @@ def test_the_catalog_needs_no_mitsuba():
     root = Path(catalog.__file__).parents[1]
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
     assert run.stdout.strip() == "False", run.stderr
+
+
+@pytest.mark.parametrize("value", [[2, 1], (2, 1), "2-1", "2,1", " 2 - 1 "])
+def test_a_strategy_may_be_written_in_many_ways(value):
+    choice = catalog.resolve("integrator", {"type": "bdpt", "debug_strategy": value})
+    assert dict(choice.parameters)["debug_strategy"] == "2-1"
+    assert catalog.strategy(choice) == "2-1"
+    assert catalog.label("integrator", choice) == "bdpt:debug_strategy=2-1"
+
+
+@pytest.mark.parametrize("value", [[2, 0], [0, 1], "2", "2-1-1", [60, 8], [-1, 4], True, 3, "a-b", [2.5, 1]])
+def test_what_is_no_strategy_is_told_how_to_write_one(value):
+    with pytest.raises(BadParameter, match=r"debug_strategy = .* is not allowed; it is \[s, t\] or s-t"):
+        catalog.resolve("integrator", {"type": "bdpt", "debug_strategy": value})
+
+
+def test_only_a_debugged_integrator_has_a_strategy():
+    assert catalog.strategy(catalog.resolve("integrator", "path")) == ""
+    assert catalog.strategy(catalog.resolve("integrator", "bdpt:debug_weighted=false")) == ""
+    alone = catalog.resolve("integrator", "bdpt:debug_strategy=3-2,debug_weighted=false")
+    assert catalog.strategy(alone) == "3-2 alone"
+
+
+def test_a_parameter_that_came_later_changes_no_old_choice():
+    """Cells that were drawn before there was a choice of lamps keep their digest."""
+    plain, spelled_out, other = (
+        catalog.resolve("integrator", how) for how in ("path", "path:light_sampler=uniform", "path:light_sampler=power")
+    )
+    assert plain == spelled_out
+    assert "light_sampler" not in plain.text
+    assert catalog.label("integrator", other) == "path:light_sampler=power"
+
+
+@pytest.mark.parametrize("depth", [-1, 67, 1000])
+def test_depths_that_an_integrator_does_not_take_are_refused(depth):
+    with pytest.raises(BadParameter, match="bdpt takes a max_depth from 1 to 66, and a scene has"):
+        catalog.check_depth(catalog.resolve("integrator", "bdpt"), depth, "a scene")
+    catalog.check_depth(catalog.resolve("integrator", "path"), depth, "a scene")
