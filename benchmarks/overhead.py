@@ -100,12 +100,13 @@ class Bare:
 
 
 def serve_bare(name: str) -> None:
-    from renderer.images import write_picture
-    from renderer.render import render
-    from renderer.scenes.load import load
     from renderer.variant import use
 
     use(name)
+    from renderer.images import write_picture
+    from renderer.render import render
+    from renderer.scenes.load import load
+
     for line in sys.stdin:
         asked: dict[str, Any] = json.loads(line)
         start = time.perf_counter()

@@ -29,10 +29,11 @@ AIM_MEMORY_GIB = 3.0
 
 
 def prepare(variant: str, size: int, spp: int) -> tuple[Any, CellSpec]:
-    from renderer.scenes.load import load
     from renderer.variant import use
 
     use(variant)
+    from renderer.scenes.load import load
+
     source = sources.find("cornell_box", Path())
     spec = CellSpec(
         Estimand(source.digest, size, size, 6, catalog.resolve("rfilter", "box")),
@@ -42,9 +43,9 @@ def prepare(variant: str, size: int, spp: int) -> tuple[Any, CellSpec]:
 
 
 def peak_memory(variant: str, size: int, spp: int, answer: Any) -> None:
-    from renderer.render import render
-
     loaded, spec = prepare(variant, size, spp)
+    from renderer.render import render  # it names types of the variant
+
     next(render(spec, loaded, [1]))
     answer.put(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
 
@@ -52,9 +53,9 @@ def peak_memory(variant: str, size: int, spp: int, answer: Any) -> None:
 def compare(variant: str, size: int, spp: int, runs: int, answer: Any) -> None:
     import mitsuba as mi
 
-    from renderer.render import render
-
     loaded, spec = prepare(variant, size, spp)
+    from renderer.render import render  # it names types of the variant
+
     native: Any = mi.load_dict({"type": "path", "max_depth": 6})
 
     def bare(seed: int) -> None:
