@@ -60,6 +60,8 @@ def main() -> int:
     options = parser.parse_args()
     device = devices.pick()
     planned = plan.expand(grids.read(options.grid))
+    if any(cell.replicates != 1 for cell in planned.cells):
+        parser.error(f"{options.grid} wants replicates or references, and the bare loop draws one picture a cell")
     with tempfile.TemporaryDirectory() as name:
         root, caches = Path(name), Path(name) / "cache"
         print(f"{options.grid.name}: {len(planned.cells)} cells on {device.description}", flush=True)
