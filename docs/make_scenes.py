@@ -12,16 +12,16 @@ import json
 import os
 from pathlib import Path
 
-import numpy as np
-
 from renderer import devices
 from renderer.scenes.builtin import BUILTIN, BuiltinScene
 from renderer.scenes.sources import find
+from renderer.spec import seed
+from service.single import cell
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "scenes.md"
 FOLDER = ROOT / "docs" / "scenes"
-SIDE, SPP, PASS = 512, 128, 16  # pixels, samples per pixel in all and of one launch
+SIDE, SPP = 512, 128  # pixels, samples per pixel
 QUALITY = 75  # of the JPEG: below 150 kB for every scene
 TOLD = {
     "good_for": "Good for", "hard_part": "Hard part", "bad_for": "Not for", "lamp_in_frame": "Lamp in the picture",
@@ -64,16 +64,14 @@ def draw(scene: str, spp: int) -> None:
     """Writes the JPEG of a scene."""
     import mitsuba as mi
 
+    from renderer.render import render
     from renderer.scenes.load import load
 
     source = find(scene, Path())
     loaded = load(source.folder, source.main, width=SIDE, height=SIDE)
-    integrator = mi.load_dict({"type": "path", "max_depth": source.defaults.max_depth})
-    picture = np.zeros((SIDE, SIDE, 3))
-    passes = max(1, spp // PASS)
-    for k in range(passes):  # seeds so far apart that no two passes share a sample
-        picture += np.asarray(mi.render(loaded.scene, integrator=integrator, spp=PASS, seed=1_000_003 * (k + 1)))
-    bitmap = mi.Bitmap((picture / passes).astype(np.float32))
+    spec = cell(source, integrator=None, sampler=None, spp=spp, size=f"{SIDE}x{SIDE}", max_depth=None)
+    (drawn,) = render(spec, loaded, [seed(spec.digest, 0)])
+    bitmap = mi.Bitmap(drawn.picture)
     shown = bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.UInt8, srgb_gamma=True)
     shown.write(str(FOLDER / f"{scene}.jpg"), quality=QUALITY)
     print(f"{scene}: {(FOLDER / f'{scene}.jpg').stat().st_size / 1000:.0f} kB")

@@ -18,11 +18,11 @@ from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import find
 from renderer.scenes.xmlfile import parse
 
-DARK = {"hidden_lamp"}  # a path tracer finds the light by luck: black pixels at 64 samples
 GLOSSY = {"cornell_aniso", "glass_nested", "hidden_lamp", "many_lights", "sphere_figure"}  # highlights brighter than 3
 CAUSTIC = {"glass_caustic"}  # made of what are fireflies elsewhere
 
-# Loads and renders each scene in one colour mode, in a process of its own: a variant cannot be taken back.
+# Loads and renders each scene by its own integrator in one colour mode, in a process of its own: a variant cannot be
+# taken back.
 RENDER = """
 import json, sys
 import mitsuba as mi
@@ -32,6 +32,9 @@ import drjit as dr
 import numpy as np
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.load import load
+from renderer.scenes.sources import find
+from pathlib import Path
+own = {name: find(name, Path()).defaults.integrator for name in BUILTIN}
 x, y = (mi.Float(np.random.default_rng(k).random(10_000)) for k in (1, 2))
 out = {}
 for name, scene in BUILTIN.items():
@@ -43,7 +46,7 @@ for name, scene in BUILTIN.items():
         lamp = hit.emitter(loaded.scene).eval(hit)
         seen["misses"] += int(dr.count(~hit.is_valid())[0])
         seen["lamps"] += int(dr.count(dr.max(lamp) > 0)[0])
-    integrator = mi.load_dict({"type": "path", "max_depth": 6})
+    integrator = mi.load_dict({"type": own[name], "max_depth": 6})
     image = np.array(mi.render(loaded.scene, integrator=integrator, spp=64, seed=3), dtype=np.float64)
     light = image @ [0.2126, 0.7152, 0.0722]
     seen |= {"finite": bool(np.isfinite(image).all()), "mean": light.mean(), "median": float(np.median(light)),
@@ -75,12 +78,17 @@ def test_every_scene_has_a_reference() -> None:
         assert 2**12 <= scene.reference["spp"] <= 2**16, name
 
 
+OWN = {"glass_caustic": (8, "bdpt"), "glass_nested": (10, "path"), "hidden_lamp": (6, "bdpt")}  # max_depth, integrator
+
+
 def test_scenes_are_256_square_at_depth_6() -> None:
-    """The defaults of the house, written in the files; light that crosses glass needs more edges."""
+    """
+    The defaults of the house, written in the files; light that crosses glass needs more edges, and some need bdpt.
+    """
     for name in BUILTIN:
         defaults = find(name, Path()).defaults
-        depth = 10 if name.startswith("glass_") else 6
-        assert (defaults.width, defaults.height, defaults.max_depth, defaults.integrator) == (256, 256, depth, "path")
+        assert (defaults.width, defaults.height) == (256, 256)
+        assert (defaults.max_depth, defaults.integrator) == OWN.get(name, (6, "path")), name
         assert (defaults.crop, defaults.rfilter) == (None, "box")
 
 
@@ -96,7 +104,7 @@ def test_pictures_are_finite_well_exposed_and_closed(variant: str) -> None:
         assert seen["finite"] and seen["misses"] == 0, (name, seen)
         assert 0.15 < seen["mean"] < 0.35 and 0.08 < seen["median"] < 0.25, (name, seen)
         assert bool(seen["lamps"]) == (BUILTIN[name].lamp_in_frame is not None), (name, seen)
-        assert seen["black"] == 0 or name in DARK, (name, seen)
+        assert seen["black"] == 0, (name, seen)
         if BUILTIN[name].lamp_in_frame is None and name not in CAUSTIC:
             assert seen["bright"] < 0.005, (name, seen)
             assert seen["max"] < 3 or name in GLOSSY, (name, seen)
