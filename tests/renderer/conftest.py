@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -24,11 +25,12 @@ def tables(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="session")
 def variant() -> str:
-    """Mitsuba in ``llvm_ad_rgb``, for the whole test process."""
+    """Mitsuba in ``llvm_ad_rgb``, or in what DARTBOARD_TEST_VARIANT names, for the whole test process."""
     from renderer.variant import use
 
-    use("llvm_ad_rgb")
-    return "llvm_ad_rgb"
+    chosen = os.environ.get("DARTBOARD_TEST_VARIANT", "llvm_ad_rgb")
+    use(chosen)
+    return chosen
 
 
 def make_cell(
