@@ -115,7 +115,7 @@ def adapter(spec: CellSpec, frame: Frame) -> IntegratorAdapter:
 def _path(spec: CellSpec, frame: Frame, plugin: dict[str, Any]) -> Any:
     """Mitsuba's own path tracer, or ours where lamps are not picked as by Mitsuba's."""
     light_sampler = plugin.pop("light_sampler", UNIFORM)
-    plugin["type"] = plugin_for(light_sampler, frame.scene)
+    plugin["type"] = plugin_for(light_sampler, frame.scene, spec.estimand.hide_emitters)
     made: Any = mi.load_dict(plugin)
     if isinstance(made, PathLights):
         made.use(frame.scene, frame.lights.get(light_sampler, spec.estimand.sweep))

@@ -28,6 +28,7 @@ import mitsuba as mi
 
 from renderer.integrators.camera import Camera
 from renderer.integrators.emission import Emission
+from renderer.integrators.hiding import past_lamps
 from renderer.integrators.mis import Heuristic, weight
 from renderer.integrators.subpath import LightVertex, capacity, store
 
@@ -62,7 +63,6 @@ class Bidirectional:
         self.scene, self.camera, self.lights, self.options = scene, camera, lights, options
         self.emission = Emission(scene, lights)
         self.h = Heuristic(options.heuristic)
-        self.skipper: Any = mi.load_dict({"type": "path"}) if options.hide_emitters else None
         self.capacity = capacity(options.max_depth)
         self.max_depth = dr.opaque(mi.UInt32, options.max_depth)
         self.rr_depth = dr.opaque(mi.UInt32, options.rr_depth or 0)
@@ -184,7 +184,7 @@ class Bidirectional:
         vcm, vc = h.leave_camera(density)
         depth, active = mi.UInt32(1), mi.Bool(True)
         if dr.hint(self.options.hide_emitters, mode="scalar"):
-            pi = self._past_lamps(ray, active)
+            ray, pi = past_lamps(scene, ray, active)
         else:
             pi = scene.ray_intersect_preliminary(ray, coherent=True)
         last_p, last_n = mi.Point3f(last.p), mi.Normal3f(0)
@@ -305,10 +305,6 @@ class Bidirectional:
         return dr.select(active, value * self._weight(others), 0)
 
     # -- both --------------------------------------------------------------------------------------------------------
-
-    def _past_lamps(self, ray: Any, active: Any) -> Any:
-        """The first thing on a ray that is no lamp."""
-        return self.skipper.skip_area_emitters(self.scene, ray, True, active)
 
     def _wanted(self, s: Any, t: Any) -> Any:
         """Whether paths are made that way."""

@@ -6,7 +6,8 @@ The walk, its order of random numbers and its weights are those of Mitsuba's ``p
 against the pmf at the *previous* vertex, where it could have been picked.
 
 What picks like Mitsuba need not be walked by us: ``plugin_for`` names Mitsuba's own ``path`` for ``uniform``, and for
-any light sampler where there is one lamp or none. It is compiled code: less time to trace each pass.
+any light sampler where there is one lamp or none. It is compiled code: less time to trace each pass. Two faults of it
+are not copied (``plugin_for`` names them).
 
 This module derives from ``mi.SamplingIntegrator``: import it when a variant has been set.
 """
@@ -18,6 +19,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from renderer.integrators.hiding import past_lamps
 from renderer.lightsamplers import make
 
 MAX_SURVIVAL = 0.95  # of Russian roulette, as Mitsuba's
@@ -58,15 +60,16 @@ class PathLights(mi.SamplingIntegrator):
         if self._lights.scene is not scene:
             self.use(scene, make(self.light_sampler, scene))
         ray, active = mi.Ray3f(ray), mi.Bool(active)
-        first = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         if self.hide_emitters:
-            lamp = first.is_valid() & (first.shape.emitter() != None) & active  # noqa: E711 - a comparison of lanes
-            beyond = first.compute_surface_interaction(ray, mi.RayFlags.Minimal, lamp).spawn_ray(ray.d)
-            first[lamp] = self.skip_area_emitters(scene, beyond, True, lamp)
+            ray, first = past_lamps(scene, ray, active)
+        else:
+            first = scene.ray_intersect_preliminary(ray, coherent=True, active=active)
         seen = mi.Bool(not self.hide_emitters and scene.environment() is not None)
         most = 2**32 - 1 if self.max_depth == -1 else self.max_depth
         light, seen = _walk(scene, sampler, self._lights.sampler, ray, first, seen, most, self.rr_depth, active)
-        return dr.select(seen, light, 0), seen, []
+        if self.hide_emitters:
+            light = dr.select(first.is_valid(), light, 0)  # nor is the sky
+        return light, seen, []
 
     def to_string(self) -> str:
         return (
@@ -75,14 +78,25 @@ class PathLights(mi.SamplingIntegrator):
         )
 
 
-def plugin_for(light_sampler: str, scene: Any) -> str:
+def plugin_for(light_sampler: str, scene: Any, hide_emitters: bool = False) -> str:
     """
     The plugin that traces paths through ``scene`` with this light sampler: ``path`` where Mitsuba's own draws the same
     picture to the last bit, ``path_lights`` elsewhere. Mitsuba must pick uniformly by then (``equal_weights``).
 
+    Where Mitsuba 3.9.1 is wrong, ours is taken, too: behind hidden lamps (``hiding``), and where a camera ray has
+    passed a semi-transparent mask and then leaves the scene, for which it drops what the mask itself reflected.
+
     ``power`` could be written into Mitsuba's weights. It is not: it would be no faster, and the scene stays as it is.
     """
+    if hide_emitters or any(_is_mask(shape.bsdf()) for shape in scene.shapes()):
+        return "path_lights"
     return "path" if light_sampler == "uniform" or len(scene.emitters()) < 2 else "path_lights"
+
+
+def _is_mask(bsdf: Any) -> bool:
+    """Whether a material lets light pass straight, and does something else with it as well."""
+    flags = bsdf.flags() if bsdf is not None else mi.UInt32(0)
+    return bool(mi.has_flag(flags, mi.BSDFFlags.Null)) and bool(mi.has_flag(flags, mi.BSDFFlags.Smooth))
 
 
 def equal_weights(scene: Any) -> None:

@@ -14,7 +14,9 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-CAPACITIES = (4, 8, 16, 32, 64)  # vertices; few sizes, so that most depths share a kernel
+# Vertices. Two sizes, so that nearly all depths share a kernel; and CUDA's compiler makes registers of smaller arrays,
+# which takes twice the time.
+CAPACITIES = (32, 64)
 
 
 class LightVertex:

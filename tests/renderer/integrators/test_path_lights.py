@@ -152,6 +152,35 @@ def test_mitsuba_walks_where_it_draws_the_same(name: str, lamps: int) -> None:
     points = {f"lamp_{k}": {"type": "point", "position": [k, 0, 0]} for k in range(lamps)}
     scene = mi.load_dict({"type": "scene", **points})
     assert plugin_for(name, scene) == ("path" if name == "uniform" or lamps < 2 else "path_lights")
+    assert plugin_for(name, scene, hide_emitters=True) == "path_lights"
+
+
+def test_we_walk_where_mitsuba_drops_light() -> None:
+    """
+    A half transparent screen before nothing: what it reflects is there, whatever the camera ray does then.
+
+    Mitsuba's ``direct`` has it right, and ``path`` has not: this is told to be checked again with the next Mitsuba.
+    """
+    import mitsuba as mi
+
+    from renderer.integrators.path_lights import plugin_for
+
+    t = mi.ScalarTransform4f()
+    screen = {"type": "mask", "opacity": 0.5, "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}}}
+    scene = mi.load_dict({
+        "type": "scene",
+        "screen": {"type": "rectangle", "to_world": t.scale(5), "bsdf": screen},
+        "lamp": {"type": "point", "position": [0, 0, 3]},
+        "sensor": {"type": "perspective", "to_world": t.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
+                   "film": {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "box"}}},
+    })  # fmt: skip
+    assert plugin_for("uniform", scene) == "path_lights"
+    ours, direct, path = (
+        pictures(scene, how, 256).mean()
+        for how in (integrator("uniform", max_depth=2), mi.load_dict({"type": "direct"}), integrator(None, max_depth=2))
+    )
+    assert ours == pytest.approx(direct, rel=0.01)
+    assert path < 0.6 * direct
 
 
 @pytest.mark.parametrize("name", NAMES)
