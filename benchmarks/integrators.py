@@ -337,12 +337,12 @@ def forced(stage: Stage, light_sampler: str, spp: int) -> Callable[[int], float]
 
 def show_start(variant: str) -> None:
     """First calls, and the memory of a large cell."""
-    print(f"\n{'first call, 64×64, 1 spp':<30}{'cold s':>9}{'compile':>9}{'cached s':>10}{'compile':>9}{'again s':>9}")
+    print(f"\n{'first call, 64×64, 1 spp':<38}{'cold s':>9}{'compile':>9}{'cached s':>10}{'compile':>9}{'again s':>9}")
     for scene in START_SCENES:
         for label in ("path", SPATIAL, "bdpt") if scene == "many_lights" else ("path", "bdpt"):
             with empty_kernel_cache():
                 cold, cached = child(first_call, variant, scene, label), child(first_call, variant, scene, label)
-            print(f"{f'{scene} {label}':<30}{cold[0]:>9.2f}{cold[1]:>9.2f}{cached[0]:>10.2f}{cached[1]:>9.2f}"
+            print(f"{f'{scene} {label}':<38}{cold[0]:>9.2f}{cold[1]:>9.2f}{cached[0]:>10.2f}{cached[1]:>9.2f}"
                   f"{cached[2]:>9.3f}")  # fmt: skip
     print(f"aims of bdpt: cold < {AIM_COLD_SECONDS:g} s, cached < {AIM_CACHED_SECONDS:g} s")
     memory = child(peak_memory, variant, "cornell_box", "bdpt")
@@ -366,10 +366,11 @@ def empty_kernel_cache() -> Iterator[None]:
 
 def first_call(variant: str, scene: str, label: str, answer: Any) -> None:
     """(seconds of the first picture, of these in code generation, seconds of the second picture)."""
-    from renderer.render import render
     from renderer.variant import use
 
     use(variant)
+    from renderer.render import render  # it names types of the variant
+
     stage = Stage(scene, 64)
     spec = stage.spec(label, 1)
     start = time.perf_counter()

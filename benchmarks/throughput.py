@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
+import queue
 import resource
 import statistics
 import sys
@@ -73,13 +74,26 @@ def compare(variant: str, size: int, spp: int, runs: int, answer: Any) -> None:
     answer.put(pairs)
 
 
+class ChildDied(Exception):
+    """A measurement in a process of its own gave no answer."""
+
+
 def child(work: Callable[..., None], *arguments: Any) -> Any:
-    """Run in a fresh process, so that neither memory nor kernels of one measurement are another's."""
+    """
+    Run in a fresh process, so that neither memory nor kernels of one measurement are another's. Raises ``ChildDied``
+    where it gives no answer; it has said why by then.
+    """
     context = multiprocessing.get_context("spawn")
     answer = context.Queue()
     process = context.Process(target=work, args=(*arguments, answer))
     process.start()
-    result = answer.get()
+    while True:
+        try:
+            result = answer.get(timeout=1)
+            break
+        except queue.Empty:
+            if not process.is_alive():
+                raise ChildDied(f"the measurement ended with exit code {process.exitcode}") from None
     process.join()
     return result
 
