@@ -33,10 +33,10 @@ def pair_of(value: object) -> str | None:
 
 INTEGRATORS = (
     Entry("integrator", "path", "path tracing with next-event estimation and multiple importance sampling",
-          f"{MITSUBA}; other than uniform light picking: Dartboard's path_lights, after pbrt-v3 and pbrt-v4", "path",
+          MITSUBA, "path",
           parameters=(_DEPTH, _HIDE, _LIGHTS, _ROULETTE)),
     Entry("integrator", "bdpt", "bidirectional path tracing: paths from camera and lamps, joined in every way",
-          "Dartboard; Veach and Guibas 1995, Lafortune and Willems 1993, weights after Georgiev 2012", "bdpt",
+          "Dartboard", "bdpt",
           deepest=BDPT_DEPTH,
           parameters=(
               Parameter("max_depth", int, None, "edges of the longest path", "edges", 1, BDPT_DEPTH, estimand=True),
@@ -54,8 +54,8 @@ INTEGRATORS = (
     Entry("integrator", "direct", "direct light only: paths of at most two edges", MITSUBA, "direct", depth=2,
           parameters=(_HIDE, Parameter("emitter_samples", int, 1, "light samples per camera ray", "", 1, 1024),
                       Parameter("bsdf_samples", int, 1, "BSDF samples per camera ray", "", 1, 1024))),
-    Entry("integrator", "ptracer", "particle tracing: paths from the lamps alone, joined to the camera", MITSUBA,
-          "ptracer", aliases=("light",), parameters=(_DEPTH, _HIDE, _ROULETTE)),
+    Entry("integrator", "ptracer", "particle tracing, from the lamps alone: glass and mirrors that are seen stay black",
+          MITSUBA, "ptracer", aliases=("light",), parameters=(_DEPTH, _HIDE, _ROULETTE)),
     Entry("integrator", "volpath", "path tracing through smoke and fog, and straight through masks", MITSUBA, "volpath",
           parameters=(_DEPTH, _HIDE, _ROULETTE)),
 )  # fmt: skip
