@@ -16,7 +16,7 @@ from renderer import catalog
 from renderer.errors import SceneError
 from renderer.frame import Frame, PassSum, Splats
 from renderer.integrators.bdpt import Bidirectional, Options
-from renderer.integrators.camera import Camera
+from renderer.integrators.camera import ORTHOGRAPHIC, Camera
 from renderer.integrators.path_lights import PathLights, equal_weights, plugin_for
 from renderer.spec import CellSpec
 
@@ -109,7 +109,11 @@ def adapter(spec: CellSpec, frame: Frame) -> IntegratorAdapter:
     if entry.name == "path":
         return CameraPaths(_path(spec, frame, plugin))
     made = mi.load_dict(plugin)
-    return LightPaths(made) if entry.name == "ptracer" else CameraPaths(made)
+    if entry.name != "ptracer":
+        return CameraPaths(made)
+    if frame.sensor.class_name() == ORTHOGRAPHIC:
+        raise SceneError("Mitsuba's ptracer cannot join light paths to an orthographic sensor; bdpt can")
+    return LightPaths(made)
 
 
 def _path(spec: CellSpec, frame: Frame, plugin: dict[str, Any]) -> Any:

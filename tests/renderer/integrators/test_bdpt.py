@@ -261,6 +261,12 @@ def test_smoke_is_refused_in_a_sentence() -> None:
         draw(scene, "bdpt", 1)
 
 
+def test_a_particle_tracer_of_parallel_rays_is_refused_in_a_sentence() -> None:
+    scene = room(lamps()["rectangle"], {}, **cameras()["orthographic"])
+    with pytest.raises(SceneError, match="orthographic sensor; bdpt can"):
+        draw(scene, "ptracer", 1)
+
+
 def test_kernels_do_not_grow_with_the_depth() -> None:
     """Depths that need as much room for vertices share one kernel, and more room makes it no longer."""
     scene = room(lamps()["rectangle"], {})
