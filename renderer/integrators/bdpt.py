@@ -115,18 +115,19 @@ class Bidirectional:
             way = camera.connect(si.p, lens, smooth)
             seen = way.active & self._wanted(depth + 1, mi.UInt32(1))
             toward = si.to_local(way.direction)
-            value = bsdf.eval(context, si, toward, seen) * _adjoint(si, toward)
+            value, reverse = bsdf.eval_pdf(mi.BSDFContext(), _turned(si, toward), si.wi, seen)
+            value = value * _adjoint(si, toward)
             seen &= dr.any(value != 0)
-            reverse = bsdf.pdf(context, _turned(si, toward), si.wi, seen)
             others = h(way.density * dr.abs(dr.dot(si.n, way.direction))) * h.rest(vcm, vc, reverse)
             seen &= self._sees_camera(si, way, seen)
             splat(way.position, weights * beta * value * (way.density * self._weight(others)), seen)
 
             # on
             bs, value = bsdf.sample(context, si, sampler.next_1d(), sampler.next_2d(), active)
-            value = value * _adjoint(si, bs.wo)
             delta = mi.has_flag(bs.sampled_type, mi.BSDFFlags.Delta)
-            reverse = bsdf.pdf(context, _turned(si, bs.wo), si.wi, active & ~delta)
+            back, reverse = bsdf.eval_pdf(mi.BSDFContext(), _turned(si, bs.wo), si.wi, active & ~delta)
+            back = dr.select(bs.pdf > 0, back * (_adjoint(si, bs.wo) / bs.pdf), 0)
+            value = dr.select(delta, value, back)
             away = si.to_world(bs.wo)
             vcm, vc = h.scatter(vcm, vc, bs.pdf, reverse, dr.abs(dr.dot(si.n, away)), delta)
             beta *= value
@@ -293,12 +294,13 @@ class Bidirectional:
         active = active & wanted & dr.any(vertex.beta != 0) & dr.isfinite(inverse)
         value, forward = bsdf.eval_pdf(camera_side, si, wo, active)
         active &= dr.any(value != 0)
-        other_value, other_forward = vertex.bsdf.eval_pdf(light_side, other, other_wo, active)
+        turned = _turned(other, other_wo)
+        other_value, other_reverse = vertex.bsdf.eval_pdf(camera_side, turned, vertex.wi, active)
         value = value * other_value * vertex.beta * (inverse * _adjoint(other, other_wo))
         active &= dr.any(value != 0)
         active &= ~self.scene.ray_test(si.spawn_ray_to(vertex.p), active)
         reverse = bsdf.pdf(camera_side, _turned(si, wo), si.wi, active)
-        other_reverse = vertex.bsdf.pdf(light_side, _turned(other, other_wo), vertex.wi, active)
+        other_forward = vertex.bsdf.pdf(light_side, other, other_wo, active)
         reach = forward * dr.abs(dr.dot(vertex.n, direction)) * inverse
         other_reach = other_forward * dr.abs(dr.dot(si.n, direction)) * inverse
         others = h(reach) * h.rest(vertex.vcm, vertex.vc, other_reverse) + h(other_reach) * h.rest(vcm, vc, reverse)
@@ -323,10 +325,9 @@ def _turned(si: Any, wi: Any) -> Any:
 
 def _adjoint(si: Any, wo: Any) -> Any:
     """
-    What a BSDF is to be multiplied with where light, not importance, is scattered to ``wo``: shading normals make it
-    other than reciprocal (Veach 1997, eq. 5.19).
+    What a BSDF that is evaluated as the camera does it, with light from ``si.wi`` scattered to ``wo``, is to be
+    multiplied with where light is followed: |wo · n| / |wi · n| of the geometric normal (Veach 1997, 5.3.2). So
+    whatever a material does to its normal, and whether it is reciprocal, both ways to make a path bring the same.
     """
     to_light, to_camera = dr.dot(si.n, si.to_world(si.wi)), dr.dot(si.n, si.to_world(wo))
-    shading = mi.Frame3f.cos_theta(si.wi) * to_camera
-    geometric = mi.Frame3f.cos_theta(wo) * to_light
-    return dr.select(geometric != 0, dr.abs(shading / geometric), 0)
+    return dr.select(to_light != 0, dr.abs(to_camera / to_light), 0)
