@@ -12,7 +12,8 @@ lamp and t from the camera:
 and are weighed by ``mis``. Paths of the same length that differ in s all estimate the same light, so that sums of them
 with weights that add up to one do too (Veach and Guibas 1995; Lafortune and Willems 1993).
 
-Depth, hidden lamps and shading normals mean what they mean to Mitsuba's ``path``: both have the same expected picture.
+Depth, hidden lamps and shading normals mean what they mean to Mitsuba's ``path``: both have the same expected picture,
+but for light of Dirac lamps by way of mirrors and glass, which no path tracer finds.
 
 This module names the variant's types: import it when a variant has been set.
 """
@@ -34,13 +35,11 @@ from renderer.integrators.subpath import LightVertex, capacity, store
 
 Splat = Callable[[Any, Any, Any], None]  # (position on the film in pixels, spectrum, active)
 
-MAX_DEPTH = 66  # edges: as many vertices of light subpaths as there is room for, and two
-
 
 @dataclass(frozen=True)
 class Options:
     """
-    max_depth      edges of the longest path, 1 … MAX_DEPTH
+    max_depth      edges of the longest path, at least 1; the catalog says how many there is room for
     heuristic      "balance" or "power"
     hide_emitters  lamps with an area, and environments, are not seen directly
     rr_depth       edges of a subpath before Russian roulette; None for none
@@ -204,7 +203,6 @@ class Bidirectional:
             radiance = emitter.eval(si, hit)
             hit &= dr.any(radiance != 0)
             index = lights.index(emitter)
-            others = mi.Float(0)
             indirect = hit & (depth > 1)
             p_direct = emitter.pdf_direction(last, ds, indirect)
             p_lamp = lights.pmf(last_p, last_n, index, indirect)
