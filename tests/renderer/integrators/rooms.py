@@ -14,6 +14,7 @@ import numpy as np
 
 from renderer import catalog
 from renderer.spec import CellSpec, Choice, Estimand, seed
+from tests.renderer.scene_of import scene_of
 
 SIZE = (16, 16)
 
@@ -133,7 +134,6 @@ def room(
     material = {slot: dict(made_of.get(slot, plain)) for slot in SLOTS}
     placed = t.translate([0.6, -0.65, 0.1]) @ t.rotate([0, 1, 0], 25) @ t.scale(0.35)
     made = {
-        "type": "scene",
         "sensor": sensor,
         "ball": {"type": "sphere", "center": [-0.55, -0.5, 0], "radius": 0.5, "bsdf": material["ball"]},
         "block": {"type": "cube", "to_world": placed, "bsdf": material["block"]},
@@ -144,7 +144,7 @@ def room(
                  "bsdf": material["left"]},
         **lamp,
     }  # fmt: skip
-    scene: Any = mi.load_dict(made, optimize=False)  # as our loader does
+    scene = scene_of(made)
     if smooth_block:
         parameters = mi.traverse(scene)
         corners = np.array(parameters["block.vertex_positions"]).reshape(-1, 3) - [0.6, -0.65, 0.1]

@@ -17,6 +17,7 @@ import pytest
 from renderer.errors import SceneError
 from tests.renderer.integrators.rooms import DIRAC_LAMPS, MIRRORS, draw, lamps, materials, room
 from tests.renderer.means import check_means
+from tests.renderer.scene_of import scene_of
 
 pytestmark = pytest.mark.usefixtures("variant")
 
@@ -29,14 +30,14 @@ WITH_DIRAC = (*DIRAC_LAMPS, "several")  # rooms in which a path tracer misses ca
 # Mitsuba's path is black where it looks through one at nothing.
 SETS = {
     "smooth": {"ball": "gloss", "block": "two sides", "back": "textured", "left": "diffuse", "floor": "principled"},
-    "rough": {"ball": "rough glass", "block": "rough metal", "back": "bumps", "floor": "diffuse"},
+    "rough": {"ball": "rough glass", "block": "bumps", "back": "rough metal", "floor": "diffuse"},
     "mirrors": {"ball": "glass", "block": "mask", "back": "plastic", "left": "sharp gloss", "floor": "diffuse"},
-    "metal": {"ball": "metal", "block": "sharp gloss", "floor": "textured"},
+    "metal": {"ball": "metal", "block": "sharp gloss", "back": "bumps", "floor": "textured"},
 }
 PLAIN = [name for name, made in SETS.items() if not set(made.values()) & set(MIRRORS)]
 COVERED = [(lamp, name) for lamp, name in product(LAMPS, SETS) if name in PLAIN or lamp not in WITH_DIRAC]
 PAIRS = [(lamp, one) for lamp, one in product(LAMPS, MATERIALS) if one not in MIRRORS or lamp not in WITH_DIRAC]
-OTHERS = 40  # comparisons in this file besides these two lists
+OTHERS = 28  # comparisons in this file besides these two lists
 COMPARISONS = len(COVERED) + len(PAIRS) + OTHERS
 
 
@@ -188,12 +189,9 @@ def test_furnace(how: str) -> None:
 
 
 def furnace() -> Any:
-    import mitsuba as mi
-
     from renderer.scenes.load import LoadedScene
 
-    scene: Any = mi.load_dict({
-        "type": "scene",
+    scene: Any = scene_of({
         "box": {"type": "cube", "flip_normals": True,
                  "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": 0.5}},
                  "emitter": {"type": "area", "radiance": {"type": "rgb", "value": 1.0}}},

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from renderer.errors import UnknownName
 from renderer.lightsamplers import NAMES
 from tests.renderer.lightsamplers.conftest import mixed_scene
+from tests.renderer.scene_of import scene_of
 
 Z = 3.3  # of two means, per channel (science.md E.4)
 
@@ -60,9 +61,7 @@ def z(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
 @pytest.mark.parametrize("environment", ["constant", "envmap"])
 def test_uniform_is_the_path_of_mitsuba(environment: str, depths: tuple[int, int], hide_emitters: bool) -> None:
     """Sample by sample the same walk: pictures of one seed agree but for rounding, with every kind of lamp."""
-    import mitsuba as mi
-
-    scene = mi.load_dict(mixed_scene(environment))
+    scene = scene_of(mixed_scene(environment))
     how = {"max_depth": depths[0], "rr_depth": depths[1], "hide_emitters": hide_emitters}
     ours, native = (pictures(scene, integrator(name, **how), 16)[0] for name in ("uniform", None))
     assert (native.max() > 0) == (not hide_emitters or depths[0] != 1)
@@ -98,9 +97,7 @@ def test_samplers_of_ours_draw_in_it(load_for: Callable[..., Any], name: str) ->
 @pytest.mark.parametrize("name", NAMES)
 def test_hidden_lamps_are_not_seen_but_light(name: str) -> None:
     """At one edge nothing is left to see, with more the lamps still light the rest."""
-    import mitsuba as mi
-
-    scene = mi.load_dict(mixed_scene())
+    scene = scene_of(mixed_scene())
     assert pictures(scene, integrator(name, max_depth=1, hide_emitters=True), 4).max() == 0
     hidden, shown = (pictures(scene, integrator(name, max_depth=2, hide_emitters=hide), 16) for hide in (True, False))
     assert 0 < hidden.mean() < shown.mean()
@@ -108,17 +105,13 @@ def test_hidden_lamps_are_not_seen_but_light(name: str) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_without_lamps_the_picture_is_black(name: str) -> None:
-    import mitsuba as mi
-
-    scene = mi.load_dict({"type": "scene", "sensor": mixed_scene()["sensor"], "ball": {"type": "sphere"}})
+    scene = scene_of({"sensor": mixed_scene()["sensor"], "ball": {"type": "sphere"}})
     assert pictures(scene, integrator(name), 4).max() == 0
     assert pictures(scene, integrator(None), 4).max() == 0
 
 
 def test_no_edges_no_light() -> None:
-    import mitsuba as mi
-
-    assert pictures(mi.load_dict(mixed_scene()), integrator("spatial", max_depth=0), 4).max() == 0
+    assert pictures(scene_of(mixed_scene()), integrator("spatial", max_depth=0), 4).max() == 0
 
 
 @pytest.mark.parametrize(
@@ -133,7 +126,7 @@ def test_wrong_depths_are_told(wrong: dict[str, int], sentence: str) -> None:
 def test_an_unknown_light_sampler_is_told() -> None:
     import mitsuba as mi
 
-    scene = mi.load_dict(mixed_scene())
+    scene = scene_of(mixed_scene())
     tracer = integrator("spacial")
     with pytest.raises(UnknownName, match="unknown light sampler 'spacial'; known: .*; did you mean 'spatial'"):
         tracer.sample(scene, mi.load_dict({"type": "independent"}), mi.RayDifferential3f([0, 0, 3], [0, 0, -1]))
@@ -145,12 +138,10 @@ def test_an_unknown_light_sampler_is_told() -> None:
 @pytest.mark.parametrize("lamps", [0, 1, 2])
 @pytest.mark.parametrize("name", NAMES)
 def test_mitsuba_walks_where_it_draws_the_same(name: str, lamps: int) -> None:
-    import mitsuba as mi
-
     from renderer.integrators.path_lights import plugin_for
 
     points = {f"lamp_{k}": {"type": "point", "position": [k, 0, 0]} for k in range(lamps)}
-    scene = mi.load_dict({"type": "scene", **points})
+    scene = scene_of(points)
     assert plugin_for(name, scene) == ("path" if name == "uniform" or lamps < 2 else "path_lights")
     assert plugin_for(name, scene, hide_emitters=True) == "path_lights"
 
@@ -167,8 +158,7 @@ def test_we_walk_where_mitsuba_drops_light() -> None:
 
     t = mi.ScalarTransform4f()
     screen = {"type": "mask", "opacity": 0.5, "bsdf": {"type": "twosided", "bsdf": {"type": "diffuse"}}}
-    scene = mi.load_dict({
-        "type": "scene",
+    scene = scene_of({
         "screen": {"type": "rectangle", "to_world": t.scale(5), "bsdf": screen},
         "lamp": {"type": "point", "position": [0, 0, 3]},
         "sensor": {"type": "perspective", "to_world": t.look_at([0, 0, 5], [0, 0, 0], [0, 1, 0]),
@@ -194,25 +184,18 @@ def test_with_one_lamp_all_light_samplers_draw_one_picture(name: str, load_for: 
 
 def test_weights_of_a_file_do_not_make_uniform_uneven() -> None:
     """Mitsuba's own picking is uniform again: the random numbers of a file without weights pick the same lamps."""
-    import mitsuba as mi
-
     from renderer.integrators.path_lights import equal_weights
 
     plain = mixed_scene()
     uneven = mixed_scene()
     uneven["point"] = {**uneven["point"], "sampling_weight": 40.0}
     uneven["panel"] = {**uneven["panel"], "emitter": {**uneven["panel"]["emitter"], "sampling_weight": 0.0}}
-
-    def load(scene: dict[str, Any]) -> Any:
-        """In a fixed order, as our loader does it: merging equals and loading in threads change it from run to run."""
-        return mi.load_dict(scene, parallel=False, optimize=False)
-
-    scene = load(uneven)
+    scene = scene_of(uneven)
     before = pictures(scene, integrator(None), 16)
     equal_weights(scene)
     after = pictures(scene, integrator(None), 16)
     assert all(emitter.sampling_weight() == 1 for emitter in scene.emitters())
-    expected = pictures(load(plain), integrator(None), 16)
+    expected = pictures(scene_of(plain), integrator(None), 16)
     assert np.array_equal(after, expected)
     assert np.isclose(before, expected, rtol=1e-3, atol=1e-4).all(-1).mean() < 0.5
 
@@ -222,7 +205,7 @@ def test_light_samplers_of_a_scene_are_made_once_for_each_state_of_it() -> None:
 
     from renderer.lightsamplers.prepared import Prepared
 
-    scene = mi.load_dict(mixed_scene())
+    scene = scene_of(mixed_scene())
     parameters = mi.traverse(scene)
     prepared = Prepared(scene)
     first = prepared.get("power", ())
@@ -262,17 +245,13 @@ def test_a_sweep_leaks_into_no_other_cell(name: str, load_for: Callable[..., Any
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "uniform"])
 def test_means_are_equal(name: str, environment: str) -> None:
     """Light of every kind of lamp, by whatever it was picked, is that of Mitsuba's path."""
-    import mitsuba as mi
-
-    scene = mi.load_dict(mixed_scene(environment))
+    scene = scene_of(mixed_scene(environment))
     ours, native = (pictures(scene, integrator(picks, rr_depth=3), 128, 16) for picks in (name, None))
     assert np.abs(z(ours, native)).max() < Z, z(ours, native)
 
 
 def test_roulette_changes_no_mean() -> None:
-    import mitsuba as mi
-
-    scene = mi.load_dict(mixed_scene())
+    scene = scene_of(mixed_scene())
     early, late = (pictures(scene, integrator("spatial", rr_depth=depth), 64, 16) for depth in (1, 50))
     assert np.abs(z(early, late)).max() < Z, z(early, late)
 
@@ -322,7 +301,7 @@ import mitsuba as mi, numpy as np
 from renderer.integrators.path_lights import PathLights
 from renderer.lightsamplers import NAMES
 mi.register_integrator("path_lights", PathLights)
-scene = mi.load_dict(t.mixed_scene("envmap"))
+scene = t.scene_of(t.mixed_scene("envmap"))
 native = t.pictures(scene, t.integrator(None), 128, 12)
 ours = t.pictures(scene, t.integrator("uniform"), 128, 12)
 print(np.isclose(ours, native, rtol=1e-3, atol=1e-5).mean() > 0.99)
@@ -347,7 +326,7 @@ def test_no_colour_of_a_lamp_makes_a_new_kernel(name: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    scene = mi.load_dict(mixed_scene())
+    scene = scene_of(mixed_scene())
     parameters = mi.traverse(scene)
 
     def kernels(power: float) -> set[str]:

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.renderer.scene_of import scene_of
+
 RED, BLUE, WHITE = [3, 0.4, 0.1], [0.1, 0.5, 4], [1, 1, 1]
 
 
@@ -55,9 +57,7 @@ def mixed_scene(environment: str = "constant", **more: Any) -> dict[str, Any]:
 @pytest.fixture(params=["constant", "envmap"])
 def mixed(request: pytest.FixtureRequest, variant: str) -> Any:
     """The scene with a lamp of each kind, and each kind of environment."""
-    import mitsuba as mi
-
-    return mi.load_dict(mixed_scene(request.param))
+    return scene_of(mixed_scene(request.param))
 
 
 def points_in(scene: Any, count: int, seed: int) -> tuple[Any, Any]:

@@ -11,6 +11,7 @@ from scipy import stats
 from renderer.errors import UnknownName
 from renderer.lightsamplers import NAMES, make
 from tests.renderer.lightsamplers.conftest import points_in
+from tests.renderer.scene_of import scene_of
 
 POINTS = 16  # at which a distribution is looked at in full
 PICKS = 2**17
@@ -118,8 +119,6 @@ def test_lamps_have_the_numbers_of_the_scene(mixed: Any) -> None:
 
 def test_power_is_that_of_textbooks(variant: str) -> None:
     """πAL of area lamps, 4πI of a point, 2πI(1 − (cos a + cos b)/2) of a spot nearly, πR²E from far away."""
-    import mitsuba as mi
-
     from renderer.lightsamplers.power import powers
 
     light = {"type": "rgb", "value": [2, 1, 0.5]}
@@ -135,7 +134,7 @@ def test_power_is_that_of_textbooks(variant: str) -> None:
         "g": ({"type": "constant", "radiance": light}, np.pi * 3 * 4 * np.pi),
         "h": ({"type": "spot", "intensity": light, "cutoff_angle": 30, "beam_width": 29.9}, 2 * np.pi * 0.1335),
     }  # fmt: skip
-    scene = mi.load_dict({"type": "scene", **{name: lamp for name, (lamp, _) in lamps.items()}})
+    scene = scene_of({name: lamp for name, (lamp, _) in lamps.items()})
     assert len(scene.emitters()) == len(lamps)
     assert np.allclose(sorted(powers(scene)), sorted(y * power for _, power in lamps.values()), rtol=0.02)
 
@@ -148,7 +147,7 @@ def test_power_of_a_picture_is_that_of_its_mean(variant: str) -> None:
 
     pixels = np.random.default_rng(7).random((16, 16, 3)).astype(np.float32) ** 8
     lamp = {"type": "area", "radiance": {"type": "bitmap", "bitmap": mi.Bitmap(pixels), "raw": True}}
-    scene = mi.load_dict({"type": "scene", "lamp": {"type": "rectangle", "emitter": lamp}})
+    scene = scene_of({"lamp": {"type": "rectangle", "emitter": lamp}})
     first = powers(scene)
     assert np.isclose(first[0], 4 * np.pi * (pixels @ [0.212671, 0.71516, 0.072169]).mean(), rtol=0.05)
     assert np.array_equal(first, powers(scene))
@@ -157,15 +156,13 @@ def test_power_of_a_picture_is_that_of_its_mean(variant: str) -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_lamp_without_light_is_not_lost(name: str, variant: str) -> None:
     """Nothing is certain about a lamp: all black, or one of them, it still has a probability."""
-    import mitsuba as mi
-
     black = {"type": "point", "intensity": {"type": "rgb", "value": 0}}
     shape = {"type": "sphere", "radius": 2}
     for others in (
         {},
         {"bright": {"type": "point", "position": [1, 0, 0], "intensity": {"type": "rgb", "value": 1e6}}},
     ):
-        scene = mi.load_dict({"type": "scene", "shape": shape, "a": black, "b": dict(black), **others})
+        scene = scene_of({"shape": shape, "a": black, "b": dict(black), **others})
         p, n = points_in(scene, 8, seed=8)
         pmf = full_pmf(make(name, scene), p, n, 8)
         assert (pmf > 1e-7).all() and np.allclose(pmf.sum(axis=1), 1), pmf
@@ -176,7 +173,7 @@ def test_without_lamps_all_is_dark(name: str, variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    scene = mi.load_dict({"type": "scene", "shape": {"type": "sphere"}})
+    scene = scene_of({"shape": {"type": "sphere"}})
     sampler = make(name, scene)
     it = dr.zeros(mi.Interaction3f, 4)
     ds, weight, index, pmf = sampler.sample_direction(it, mi.Point2f(0.5), True)
@@ -185,8 +182,6 @@ def test_without_lamps_all_is_dark(name: str, variant: str) -> None:
 
 
 def test_a_wrong_name_is_told_the_right_ones(variant: str) -> None:
-    import mitsuba as mi
-
-    scene = mi.load_dict({"type": "scene"})
+    scene = scene_of({})
     with pytest.raises(UnknownName, match="unknown light sampler 'spatail'; known: .*power.*uniform"):
         make("spatail", scene)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from renderer.lightsamplers import make
+from tests.renderer.scene_of import scene_of
 
 LAMP = {"type": "rgb", "value": [1, 1, 1]}
 
@@ -32,8 +33,8 @@ def test_equal_lamps_count_by_the_square_of_their_distance(variant: str) -> None
     """Two points far from a small voxel: 0.9 of the probability goes by 1/d², 0.1 by their equal power."""
     import mitsuba as mi
 
-    scene = mi.load_dict({
-        "type": "scene", "box": {"type": "cube"},
+    scene = scene_of({
+        "box": {"type": "cube"},
         "a": {"type": "point", "position": [0, 0, 3], "intensity": LAMP},
         "b": {"type": "point", "position": [0, 0, -9], "intensity": LAMP},
     })  # fmt: skip
@@ -50,8 +51,8 @@ def test_a_lamp_that_faces_away_keeps_the_share_of_its_power(variant: str) -> No
 
     place = mi.ScalarTransform4f
     area = {"type": "area", "radiance": LAMP}
-    scene = mi.load_dict({
-        "type": "scene", "box": {"type": "cube"},
+    scene = scene_of({
+        "box": {"type": "cube"},
         "to": {"type": "rectangle", "to_world": place().translate([0, 0, -2]), "emitter": area},
         "away": {"type": "rectangle", "to_world": place().translate([0, 0, 2]), "emitter": dict(area)},
     })  # fmt: skip
@@ -78,7 +79,7 @@ def test_a_scene_without_shapes_or_extent_has_a_voxel(variant: str) -> None:
 
     lamps = {name: {"type": "point", "position": [0, 0, 0], "intensity": LAMP} for name in "ab"}
     for shapes in ({}, {"flat": {"type": "rectangle"}}):
-        scene = mi.load_dict({"type": "scene", **lamps, **shapes})
+        scene = scene_of({**lamps, **shapes})
         assert make("spatial", scene).pmf(mi.Point3f(0.2, 0.2, 0), None, mi.UInt32(0))[0] == 0.5
 
 

@@ -10,6 +10,7 @@ import pytest
 from renderer.lightsamplers import make
 from tests.renderer.lightsamplers.conftest import points_in
 from tests.renderer.lightsamplers.test_laws import full_pmf
+from tests.renderer.scene_of import scene_of
 
 LIGHT = {"type": "rgb", "value": [1, 1, 1]}
 
@@ -99,7 +100,7 @@ def test_near_lamps_and_those_that_face_the_point_are_picked(variant: str) -> No
 
     def share(a: Any, b: Any, p: Any, n: Any) -> float:
         lamp = {"type": "rectangle", "emitter": area}
-        scene = mi.load_dict({"type": "scene", "a": {**lamp, "to_world": a}, "b": {**lamp, "to_world": b}})
+        scene = scene_of({"a": {**lamp, "to_world": a}, "b": {**lamp, "to_world": b}})
         sampler = make("bvh", scene)
         first = next(k for k, e in enumerate(scene.emitters()) if "a" in e.get_shape().id())
         return float(sampler.pmf(mi.Point3f(p), mi.Normal3f(n), mi.UInt32(first))[0])
@@ -119,7 +120,7 @@ def test_infinite_lamps_share_what_pbrt_gives_them(variant: str) -> None:
     sky = {"sky": {"type": "constant"}, "sun": {"type": "directional"}}
     lamps = {f"lamp_{k}": {"type": "point", "position": [k, 0, 0]} for k in range(3)}
     for others, share in (({}, 1), (lamps, 2 / 3)):
-        scene = mi.load_dict({"type": "scene", "ball": {"type": "sphere"}, **sky, **others})
+        scene = scene_of({"ball": {"type": "sphere"}, **sky, **others})
         far = [mi.has_flag(e.flags(), mi.EmitterFlags.Infinite) for e in scene.emitters()]
         pmf = full_pmf(make("bvh", scene), *points_in(scene, 4, seed=1), 4)
         assert np.allclose(pmf[:, far], share / 2) and np.allclose(pmf.sum(1), 1)
