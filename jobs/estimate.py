@@ -43,7 +43,7 @@ class Estimate:
     samples     still to be rendered
     seconds     for these, with compiling and writing
     disk_bytes  for the pictures still to be rendered, if all are kept
-    rough       True: for some scene and integrator no rate was measured, ROUGH_RATE stands in
+    rough       True: for some scene and integrator no rate was measured, ROUGH_RATE and the integrator's cost stand in
     """
 
     cells: int
@@ -75,9 +75,10 @@ def estimate(plan: Plan, rates: Rates | None = None, had: Had | None = None) -> 
         width, height = cell.spec.estimand.size
         rate = rates.get((cell.scene, cell.integrator))
         rough = rough or rate is None
+        guess = ROUGH_RATE / catalog.find("integrator", cell.spec.integrator.name).cost
         kernels.add((cell.scene, cell.integrator, cell.sampler))
         samples += missing * width * height * cell.spec.spp
-        seconds += missing * (width * height * cell.spec.spp / (rate or ROUGH_RATE) + PICTURE_SECONDS)
+        seconds += missing * (width * height * cell.spec.spp / (rate or guess) + PICTURE_SECONDS)
         disk_bytes += missing * (width * height * EXR_BYTES_PER_PIXEL + EXR_HEADER_BYTES)
     return Estimate(
         cells=sum(cell.role == "cell" for cell in plan.cells),

@@ -221,6 +221,22 @@ def _reference(source: sources.SceneSource, common: _Settings, own: _Settings | 
     said: list[Any] = [level.reference for level in (common, own) if level and level.reference is not None]
     if said and said[-1] is False:
         return None
+    given = [level for level in said if isinstance(level, Mapping)]
+    return _reference_with(given, source, common.table.problems, common.table.where)
+
+
+def own_reference(source: sources.SceneSource) -> ReferenceRequest:
+    """The reference of a scene of which a grid says nothing."""
+    problems = Problems()
+    made = _reference_with((), source, problems, source.name)
+    problems.raise_any()
+    return made
+
+
+def _reference_with(
+    said: Iterable[Mapping[str, Any]], source: sources.SceneSource, problems: Problems, where: str
+) -> ReferenceRequest:
+    """What is ``said``, the last first, before what the scene has. ``where`` it was said goes into sentences."""
     fields: dict[str, Any] = {
         "integrator": catalog.resolve("integrator", "path"),
         "sampler": catalog.resolve("sampler", "independent"),
@@ -228,13 +244,14 @@ def _reference(source: sources.SceneSource, common: _Settings, own: _Settings | 
         "replicates": 2,
     }
     if source.reference:
-        table = Table({"reference": source.reference}, source.name, ["reference"], common.table.problems)
-        said.insert(0, _reference_fields(table, f"[reference] of {source.name}"))
+        table = Table({"reference": source.reference}, source.name, ["reference"], problems)
+        own = _reference_fields(table, f"[reference] of {source.name}")
+        fields |= own if isinstance(own, Mapping) else {}
     for level in said:
-        fields |= level if isinstance(level, Mapping) else {}
+        fields |= level
     asked = -(-fields["asked_total"] // fields["replicates"])
-    where = f"spp of the reference of {common.table.where}"
-    spp = common.table.problems.attempt(lambda: catalog.rendered_spp(fields["sampler"], asked, where))
+    place = f"spp of the reference of {where}"
+    spp = problems.attempt(lambda: catalog.rendered_spp(fields["sampler"], asked, place))
     return ReferenceRequest(spp=spp or asked, asked=asked, **fields)
 
 

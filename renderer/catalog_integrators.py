@@ -37,7 +37,7 @@ INTEGRATORS = (
           parameters=(_DEPTH, _HIDE, _LIGHTS, _ROULETTE)),
     Entry("integrator", "bdpt", "bidirectional path tracing: paths from camera and lamps, joined in every way",
           "Dartboard", "bdpt",
-          deepest=BDPT_DEPTH,
+          deepest=BDPT_DEPTH, cost=3.0,
           parameters=(
               Parameter("max_depth", int, None, "edges of the longest path", "edges", 1, BDPT_DEPTH, estimand=True),
               _HIDE, _LIGHTS,

@@ -114,6 +114,7 @@ class Entry:
     check_spp  samplers only: the same for parameters and the spp that is rendered
     depth      integrators only: the max_depth it always renders, None where it takes any
     deepest    integrators only: the largest max_depth that it takes, None where it takes any and none
+    cost       integrators only: time of a sample, in those of path; for estimates before anything was timed
     """
 
     axis: str
@@ -131,6 +132,7 @@ class Entry:
     check_spp: Callable[[Values, int, str], None] = _any_spp
     depth: int | None = None
     deepest: int | None = None
+    cost: float = 1.0
 
 
 def _finite(value: float) -> float | None:

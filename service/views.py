@@ -47,7 +47,8 @@ def detail(store: Store, found: Experiment, engine: Engine) -> schemas.Experimen
     scenes = [
         schemas.SceneInfo(
             name=scene["name"], width=(scene["crop"] or [0, 0, scene["width"]])[2],
-            height=(scene["crop"] or [0, 0, 0, scene["height"]])[3], reference=_reference(scene["reference"]),
+            height=(scene["crop"] or [0, 0, 0, scene["height"]])[3],
+            reference=scene["reference"] and reference_line(scene["reference"]),
         )
         for scene in grid["scenes"]
     ]  # fmt: skip
@@ -134,9 +135,8 @@ def _sweeps(grid: dict[str, Any]) -> dict[str, list[Any]]:
     return found
 
 
-def _reference(reference: dict[str, Any] | None) -> str | None:
-    if reference is None:
-        return None
+def reference_line(reference: dict[str, Any]) -> str:
+    """How a reference is made, of its JSON in a grid."""
     sampler, integrator = _label("sampler", reference["sampler"]), _label("integrator", reference["integrator"])
     return f"{integrator}, {sampler}, {reference['replicates']} × {reference['spp']} spp"
 

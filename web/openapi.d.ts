@@ -998,6 +998,11 @@ export interface components {
             sampler: string;
             /** Spp */
             spp: number;
+            /**
+             * Reference
+             * @description how it is made where a grid says nothing about it
+             */
+            reference: string;
             /** Files */
             files: string[];
             /**

@@ -9,11 +9,12 @@ from fastapi import APIRouter, Query, Request
 from fastapi import Path as PathParameter
 from fastapi.concurrency import run_in_threadpool
 
+from jobs.gridscenes import own_reference
 from renderer.errors import shown
 from renderer.scenes import sources
 from renderer.scenes.builtin import BUILTIN
 from renderer.scenes.sources import SceneSource
-from service import bodies, schemas, uploads
+from service import bodies, schemas, uploads, views
 from service.deps import EngineDep, StoreDep
 
 router = APIRouter(prefix="/api/scenes", tags=["scenes"])
@@ -80,5 +81,6 @@ def _scene(source: SceneSource) -> schemas.Scene:
     return schemas.Scene(
         name=source.name, digest=source.digest, builtin=source.builtin, main=source.main, width=said.width,
         height=said.height, max_depth=said.max_depth, integrator=said.integrator, sampler=said.sampler, spp=said.spp,
-        files=[file.path for file in source.files], notes=list(source.notes),
+        reference=views.reference_line(own_reference(source).as_json()), files=[file.path for file in source.files],
+        notes=list(source.notes),
     )  # fmt: skip

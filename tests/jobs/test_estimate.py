@@ -43,6 +43,14 @@ def test_seconds_follow_the_measured_rate():
     assert estimate(plan, {("defocus", "path"): 1e6}).rough, "a rate of another scene says nothing"
 
 
+def test_an_integrator_that_was_never_timed_costs_as_much_as_it_usually_does():
+    path, bdpt = (
+        estimate(planned(spp=[10_000], replicates=1, reference=False, integrators=[name], resolution=[100, 100]))
+        for name in ("path", "bdpt")
+    )
+    assert bdpt.seconds == pytest.approx(3 * path.seconds, rel=0.01) and bdpt.rough
+
+
 @given(tables().map(parse))
 @settings(max_examples=30, deadline=None)
 def test_what_is_there_costs_nothing(grid):

@@ -98,7 +98,11 @@ def test_a_folder_arrives_with_what_it_refers_to_and_nothing_else(house: House) 
     kept = {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
     assert kept == {"scene.xml": WITH_MESH.encode(), "meshes/a.ply": MESH}
     assert not list(house.artifacts.work.glob("upload-*"))
-    assert scene in answers(house.client.get("/api/scenes"), schemas.Scene)
+    known = answers(house.client.get("/api/scenes"), schemas.Scene)
+    assert scene in known
+    references = {one.name: one.reference for one in known}
+    assert references["room"] == "path, independent, 2 × 2048 spp"
+    assert references["hidden_lamp"].startswith("bdpt, "), "where nobody says how, a scene does"
 
 
 def test_the_same_folder_is_the_same_scene_however_it_was_packed(house: House) -> None:

@@ -59,6 +59,18 @@ test("a replay is known by its parameter, and folds away only where leaving it o
   );
 });
 
+test("what nobody said stays each scene's own: its filter, its reference", () => {
+  const { grid } = toSubmission(linked(START));
+  assert.equal("rfilter" in grid, false);
+  assert.deepEqual(grid.reference, {});
+  const toml = 'name = "a"\nscenes = ["hidden_lamp"]\nsamplers = ["sobol"]\nspp = [4]\nreplicates = 2\n';
+  assert.equal("rfilter" in toSubmission(formOf({ toml })).grid, false);
+  const form = { ...START, rfilter: choice("tent:radius=2"), reference: { ...START.reference, spp: "64" } };
+  assert.deepEqual(linked(form), form);
+  const said = toSubmission(form).grid;
+  assert.deepEqual([said.rfilter, said.reference], ["tent:radius=2", { spp: 64 }]);
+});
+
 test("a text with options has no range", () => {
   assert.equal(allowed(REPLAY), "");
 });

@@ -18,7 +18,7 @@ import { Panel } from "./new/panel.js";
 import { Plugins } from "./new/plugins.js";
 import { formOf, tomlOf } from "./new/prefill.js";
 import { Replays } from "./new/replays.js";
-import { Scenes } from "./new/scenes.js";
+import { Scenes, scenesOf } from "./new/scenes.js";
 import { Sweeps } from "./new/sweeps.js";
 import { GridEditor } from "./new/text.js";
 import { Pictures, ReferenceFields, Spp } from "./new/values.js";
@@ -209,7 +209,12 @@ function FormFields({ form, change, catalog, known, faults, onUploaded }) {
       <${Pictures} form=${form} change=${change} catalog=${catalog} faults=${faults} />
     </section>
     <${Section} id="reference" title="Reference" hint=${HINTS.reference} faults=${faults}>
-      <${ReferenceFields} reference=${reference} catalog=${catalog} onChange=${set("reference")} />
+      <${ReferenceFields}
+        reference=${reference}
+        own=${scenesOf(scenes, known)}
+        catalog=${catalog}
+        onChange=${set("reference")}
+      />
     <//>
   </div>`;
 }

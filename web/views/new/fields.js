@@ -8,6 +8,9 @@ import { html } from "../../vendor/preact-htm.js";
 /** What in the form shows a fault of which key of a grid. @type {Record<string, string>} */
 const SHOWN_AT = { scene: "scenes", crop: "scenes" };
 
+/** What an empty field says: each scene has its own. */
+export const AS_THE_SCENE = "as the scene";
+
 /** The keys of a grid that the form has a field for. */
 export const FIELDS = [
   "name",
@@ -89,6 +92,7 @@ export function TextField({ label, value, onInput, field, faults = [], placehold
 }
 
 /**
+ * The option "" leaves it to each scene.
  * @param {{label: string, value: string, options: readonly string[], onChange: (value: string) => void}} props
  */
 export function SelectField({ label, value, options, onChange }) {
@@ -97,7 +101,7 @@ export function SelectField({ label, value, options, onChange }) {
     <label>
       <span class="label">${label}</span>
       <select value=${value} onChange=${onText(onChange)}>
-        ${known.map((one) => html`<option key=${one} value=${one} selected=${one === value}>${one}</option>`)}
+        ${known.map((one) => html`<option key=${one} value=${one} selected=${one === value}>${one || AS_THE_SCENE}</option>`)}
       </select>
     </label>
   </div>`;

@@ -14,7 +14,7 @@
 /** @typedef {{name: string, digest?: string}} SceneChoice */
 /** A parameter of the scene and its values, as they were typed; no scenes: all of them. */
 /** @typedef {{parameter: string, values: string, scenes: readonly string[]}} Sweep */
-/** What pictures are measured against; "" is the server's default. */
+/** What pictures are measured against; "" is what each scene has. */
 /** @typedef {{wanted: boolean, integrator: string, sampler: string, spp: string}} Reference */
 /**
  * @typedef {object} Form
@@ -29,7 +29,7 @@
  * @property {string} width "" with `height`: as each scene has it
  * @property {string} height
  * @property {string} depth "": as each scene has it
- * @property {Choice} rfilter
+ * @property {Choice} rfilter of type "": as each scene has it
  * @property {string} colour
  * @property {Reference} reference
  */
@@ -47,9 +47,9 @@ export const START = {
   width: "128",
   height: "128",
   depth: "",
-  rfilter: choice("box"),
+  rfilter: choice(""),
   colour: "rgb",
-  reference: { wanted: true, integrator: "path", sampler: "multijitter", spp: "2048" },
+  reference: { wanted: true, integrator: "", sampler: "", spp: "" },
 };
 
 /** `stratified:jitter=false` → a choice. @param {string} text @returns {Choice} */
@@ -193,7 +193,7 @@ export function toSubmission(form) {
     ...(form.replicates !== "" && { replicates: value(form.replicates) }),
     ...((form.width !== "" || form.height !== "") && { resolution: [value(form.width), value(form.height)] }),
     ...(form.depth !== "" && { max_depth: value(form.depth) }),
-    rfilter: label(form.rfilter),
+    ...(form.rfilter.type !== "" && { rfilter: label(form.rfilter) }),
     colour: form.colour,
     reference: reference.wanted
       ? Object.fromEntries(asked.map(([key, text]) => [key, key === "spp" ? value(String(text)) : text]))

@@ -39,7 +39,7 @@ export function formOf({ toml, paths = {}, points = {} }) {
     width: width ?? "",
     height: height ?? "",
     depth: String(grid.max_depth ?? ""),
-    rfilter: choice(String(grid.rfilter ?? "box")),
+    rfilter: choice(String(grid.rfilter ?? "")),
     colour: String(grid.colour ?? "rgb"),
     reference: {
       wanted: reference !== false,

@@ -50,6 +50,13 @@ export function Scenes({ entries, known, chosen, onChange, onUploaded }) {
     />`;
 }
 
+/** What the server has said of the chosen scenes. @param {readonly SceneChoice[]} chosen @param {readonly Scene[]} known */
+export function scenesOf(chosen, known) {
+  return chosen.flatMap((one) =>
+    known.filter(({ name, digest, builtin }) => (one.digest ? digest === one.digest : builtin && name === one.name)),
+  );
+}
+
 /**
  * @param {{title: string, name?: string, on: boolean, onToggle: () => void, children?: Child}} props
  */

@@ -4,6 +4,7 @@ import { html, useEffect, useState } from "../../vendor/preact-htm.js";
 import { scenes as api } from "../../api.js";
 import { Icon } from "../../parts/icons.js";
 import { onText } from "./fields.js";
+import { scenesOf } from "./scenes.js";
 
 /** @typedef {import("../../api.js").Scene} Scene */
 /** @typedef {import("../../api.js").SceneParameter} SceneParameter */
@@ -18,36 +19,24 @@ const OFFERED = 500; // names in the list below a field; a scene of many objects
  *   onChange: (next: readonly Sweep[]) => void}} props
  */
 export function Sweeps({ sweeps, scenes, known, colour, onChange }) {
-  const offered = useParameters(sweeps.length > 0 ? digests(scenes, known) : [], colour);
+  const offered = useParameters(sweeps.length > 0 ? scenesOf(scenes, known).map(({ digest }) => digest) : [], colour);
   /** @param {number} at @param {Partial<Sweep>} change */
   const set = (at, change) => onChange(sweeps.map((one, index) => (index === at ? { ...one, ...change } : one)));
   return html`${sweeps.map(
       (sweep, index) => html`<div class="sweep" key=${index} role="group" aria-label=${`Sweep ${index + 1}`}>
-        <label>
-          <span class="label">Parameter</span>
-          <input
-            type="text"
-            list="scene-parameters"
-            spellcheck="false"
-            autocomplete="off"
-            placeholder="sphere.bsdf.nu"
-            aria-describedby="fault-sweep"
-            value=${sweep.parameter}
-            onInput=${onText((parameter) => set(index, { parameter }))}
-          />
-        </label>
-        <label>
-          <span class="label">Values</span>
-          <input
-            type="text"
-            spellcheck="false"
-            autocomplete="off"
-            placeholder=${nowText(offered, sweep.parameter) || "10, 100, 1000"}
-            aria-describedby="fault-sweep"
-            value=${sweep.values}
-            onInput=${onText((values) => set(index, { values }))}
-          />
-        </label>
+        <${Field}
+          title="Parameter"
+          list="scene-parameters"
+          placeholder="sphere.bsdf.nu"
+          value=${sweep.parameter}
+          onChange=${(/** @type {string} */ parameter) => set(index, { parameter })}
+        />
+        <${Field}
+          title="Values"
+          placeholder=${nowText(offered, sweep.parameter) || "10, 100, 1000"}
+          value=${sweep.values}
+          onChange=${(/** @type {string} */ values) => set(index, { values })}
+        />
         <button
           class="button quiet icon"
           type="button"
@@ -69,6 +58,25 @@ export function Sweeps({ sweeps, scenes, known, colour, onChange }) {
     </div>`;
 }
 
+/**
+ * @param {{title: string, value: string, placeholder: string, list?: string, onChange: (text: string) => void}} props
+ */
+function Field({ title, value, placeholder, list, onChange }) {
+  return html`<label>
+    <span class="label">${title}</span>
+    <input
+      type="text"
+      list=${list}
+      spellcheck="false"
+      autocomplete="off"
+      placeholder=${placeholder}
+      aria-describedby="fault-sweep"
+      value=${value}
+      onInput=${onText(onChange)}
+    />
+  </label>`;
+}
+
 /** Which of the scenes a sweep applies to; none chosen means all. @param {{sweep: Sweep, scenes: readonly SceneChoice[], onChange: (next: string[]) => void}} props */
 function Where({ sweep, scenes, onChange }) {
   /** @param {string} name */
@@ -81,11 +89,6 @@ function Where({ sweep, scenes, onChange }) {
         html`<button key=${name} class="chip" type="button" aria-pressed=${sweep.scenes.includes(name)} onClick=${() => onChange(toggled(name))}>${name}</button>`,
     )}
   </div>`;
-}
-
-/** The digests of the chosen scenes. @param {readonly SceneChoice[]} chosen @param {readonly Scene[]} known */
-function digests(chosen, known) {
-  return chosen.flatMap(({ name, digest }) => digest ?? known.find((scene) => scene.builtin && scene.name === name)?.digest ?? []);
 }
 
 /** What can be swept in any of some scenes; empty until the server has told. @param {readonly string[]} digests @param {string} colour */

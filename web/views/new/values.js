@@ -3,7 +3,7 @@
 import { html, useState } from "../../vendor/preact-htm.js";
 import { Icon } from "../../parts/icons.js";
 import { entryOf } from "./catalog.js";
-import { Faults, onText, SelectField, TextField } from "./fields.js";
+import { AS_THE_SCENE, Faults, onText, SelectField, TextField } from "./fields.js";
 import { Parameters } from "./plugins.js";
 
 /** @typedef {import("../../api.js").Fault} Fault */
@@ -105,7 +105,7 @@ export function Pictures({ form, change, catalog, faults }) {
           (side) =>
             html`<button key=${side} type="button" class="link" onClick=${() => square(side)}>${side}²</button>`,
         )}
-        <button type="button" class="link" onClick=${() => square("")}>as the scene</button>
+        <button type="button" class="link" onClick=${() => square("")}>${AS_THE_SCENE}</button>
       </div>
       <${Faults} of="resolution" faults=${faults} />
     </div>
@@ -115,7 +115,7 @@ export function Pictures({ form, change, catalog, faults }) {
       numeric
       value=${depth}
       faults=${faults}
-      placeholder="as the scene"
+      placeholder=${AS_THE_SCENE}
       hint="edges; -1 is unlimited"
       onInput=${set("depth")}
     />
@@ -123,7 +123,7 @@ export function Pictures({ form, change, catalog, faults }) {
       <${SelectField}
         label="Filter"
         value=${rfilter.type}
-        options=${names(catalog.rfilters)}
+        options=${["", ...names(catalog.rfilters)]}
         onChange=${(/** @type {string} */ type) => change({ rfilter: { type, parameters: {} } })}
       />
       ${filter &&
@@ -132,7 +132,7 @@ export function Pictures({ form, change, catalog, faults }) {
         choice=${rfilter}
         onChange=${(/** @type {Form["rfilter"]} */ next) => change({ rfilter: next })}
       />`}
-      <p class="hint">${filter?.line}</p>
+      <p class="hint">${filter?.line ?? "box where its file names none: pixels stay independent"}</p>
       <${Faults} of="rfilter" faults=${faults} />
     </div>
     <div class="field">
@@ -158,8 +158,12 @@ function Side({ label, placeholder, value, onInput }) {
   />`;
 }
 
-/** @param {{reference: Reference, onChange: (next: Reference) => void, catalog: Catalog}} props */
-export function ReferenceFields({ reference, onChange, catalog }) {
+/**
+ * `own` is what the chosen scenes say of their references.
+ * @param {{reference: Reference, own: readonly {name: string, reference: string}[], catalog: Catalog,
+ *   onChange: (next: Reference) => void}} props
+ */
+export function ReferenceFields({ reference, own, catalog, onChange }) {
   const { wanted, spp, sampler, integrator } = reference;
   /** @type {(key: keyof Reference) => (value: string | boolean) => void} */
   const set = (key) => (value) => onChange({ ...reference, [key]: value });
@@ -174,18 +178,23 @@ export function ReferenceFields({ reference, onChange, catalog }) {
         label="Samples per pixel"
         numeric
         value=${spp}
-        placeholder="4096"
+        placeholder=${AS_THE_SCENE}
         hint="in total, in two independent halves"
         onInput=${set("spp")}
       />
-      <${SelectField} label="Sampler" value=${sampler} options=${names(catalog.samplers.filter(complete))} onChange=${set("sampler")} />
+      <${SelectField} label="Sampler" value=${sampler} options=${["", ...names(catalog.samplers.filter(complete))]} onChange=${set("sampler")} />
       <${SelectField}
         label="Integrator"
         value=${integrator}
-        options=${names(catalog.integrators)}
+        options=${["", ...names(catalog.integrators)]}
         onChange=${set("integrator")}
       />
-    </div>`}`;
+    </div>`}
+    ${wanted &&
+    !(integrator && sampler && spp) &&
+    html`<ul class="hint plain">
+      ${own.map(({ name, reference }) => html`<li key=${name}><b>${name}</b> has ${reference}</li>`)}
+    </ul>`}`;
 }
 
 /** Whether a plugin can be named alone. @param {import("./catalog.js").Entry} entry */
