@@ -108,7 +108,7 @@ class Scene(Wire):
     integrator: str
     sampler: str
     spp: int
-    reference: str = Field(description="how it is made where a grid says nothing about it")
+    reference: str = Field(default="", description="how it is made where a grid says nothing about it")
     files: list[str]
     notes: list[str] = Field(
         default=[], description="of a pbrt file, in the answer to its upload: what was replaced or ignored, by line"

@@ -1001,6 +1001,7 @@ export interface components {
             /**
              * Reference
              * @description how it is made where a grid says nothing about it
+             * @default
              */
             reference: string;
             /** Files */

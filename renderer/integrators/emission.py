@@ -35,7 +35,6 @@ KINDS = {
     "ConstantBackgroundEmitter": ENVIRONMENT,
     "EnvironmentMapEmitter": ENVIRONMENT,
     "SunskyEmitter": ENVIRONMENT,
-    "TimedSunskyEmitter": ENVIRONMENT,
 }
 MARGIN = 1 + 1e-3  # of the bounding sphere: what lies on it is still hit
 RIM = (1.0, 0.5)  # of the square that is mapped to a disc

@@ -16,6 +16,7 @@ from renderer.errors import shown
 # What Mitsuba 3.9 ships, without
 #   blender                                 reads memory at an address that the file names
 #   batch, irradiancemeter, radiancemeter   make no picture of a scene: several cameras in one film, or one number
+#   timed_sunsky                            fails in every compiled kernel, of Mitsuba's own integrators as well
 PLUGINS = frozenset(
     """
     area aov bitmap blackbody blendbsdf blendphase box bsplinecurve bumpmap catmullrom checkerboard circular conductor
@@ -25,9 +26,10 @@ PLUGINS = frozenset(
     moment multijitter normalmap null obj orthogonal orthographic path perspective plastic ply point polarizer pplastic
     principled principledthin projector ptracer rawconstant rayleigh rectangle regular retarder roughconductor
     roughdielectric roughplastic sdfgrid serialized sggx shapegroup specfilm sphere spot srgb stokes stratified sunsky
-    tabphase tent thindielectric thinlens timed_sunsky twosided uniform volpath volpathmis volume
+    tabphase tent thindielectric thinlens twosided uniform volpath volpathmis volume
     """.split()  # noqa: SIM905 - a hundred words read better than a hundred quoted lines
 )
+INSTEAD = {"timed_sunsky": "no variant that compiles can render it in Mitsuba 3.9; take sunsky and its hour"}
 OUR_BSDFS = frozenset({"anisophong"})  # renderer.plugins.bsdfs, which cannot be asked without Mitsuba
 # Of renderer.plugins.samplers, those that need no file. A file's sampler is replaced by the cell's, but may be named.
 OUR_SAMPLERS = frozenset(
@@ -70,6 +72,8 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
 
 def unknown_plugin(name: str | None) -> str:
     """The sentence for a plugin that is not in the lists."""
+    if name in INSTEAD:
+        return f"plugin type {name!r} is refused: {INSTEAD[name]}"
     close = difflib.get_close_matches(name or "", PLUGINS | OUR_BSDFS, n=1)
     others = ", ".join(sorted(OUR_BSDFS))
     hint = f"did you mean {close[0]!r}?" if close else f"known are the plugins that Mitsuba 3.9 ships, and {others}"
