@@ -131,6 +131,7 @@ def _bidirectional(spec: CellSpec, frame: Frame, parameters: dict[str, Any]) -> 
     options = Options(
         max_depth=spec.estimand.max_depth,
         heuristic=parameters["heuristic"],
+        aim=parameters["aim"],
         hide_emitters=spec.estimand.hide_emitters,
         rr_depth=parameters.get("rr_depth"),
         strategy=tuple(map(int, pair.split("-"))) if pair else None,  # type: ignore[arg-type]  # two

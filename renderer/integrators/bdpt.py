@@ -41,6 +41,7 @@ class Options:
     """
     max_depth      edges of the longest path, at least 1; the catalog says how many there is room for
     heuristic      "balance" or "power"
+    aim            half of the light paths are sent to glass and mirrors
     hide_emitters  lamps with an area, and environments, are not seen directly
     rr_depth       edges of a subpath before Russian roulette; None for none
     strategy       (s, t): only paths that are made that way; None for all
@@ -49,6 +50,7 @@ class Options:
 
     max_depth: int = 6
     heuristic: str = "power"
+    aim: bool = True
     hide_emitters: bool = False
     rr_depth: int | None = None
     strategy: tuple[int, int] | None = None
@@ -60,7 +62,7 @@ class Bidirectional:
 
     def __init__(self, scene: Any, camera: Camera, lights: Any, options: Options):
         self.scene, self.camera, self.lights, self.options = scene, camera, lights, options
-        self.emission = Emission(scene, lights)
+        self.emission = Emission(scene, lights, options.aim)
         self.h = Heuristic(options.heuristic)
         self.capacity = capacity(options.max_depth)
         self.max_depth = dr.opaque(mi.UInt32, options.max_depth)
@@ -207,7 +209,9 @@ class Bidirectional:
             p_direct = emitter.pdf_direction(last, ds, indirect)
             p_lamp = lights.pmf(last_p, last_n, index, indirect)
             cos = dr.select(si.is_valid(), dr.abs(mi.Frame3f.cos_theta(si.wi)), 1)
-            emission = self.emission.density(index, cos, p_direct, dr.square(ds.dist), indirect)
+            emission = self.emission.density(
+                index, dr.select(si.is_valid(), si.p, last_p), -ray.d, cos, p_direct, dr.square(ds.dist), indirect
+            )
             others = h(p_direct * p_lamp) * vcm + h(emission / cos) * vc
             light += dr.select(hit, beta * radiance * self._weight(dr.select(indirect, others, 0)), 0)
 
@@ -228,7 +232,7 @@ class Bidirectional:
             lit &= dr.any(value != 0)
             reverse = bsdf.pdf(context, _turned(si, wo), si.wi, lit)
             others = self._others_of_picking(
-                ds, index, pmf, forward, dr.abs(dr.dot(si.n, ds.d)), h.rest(vcm, vc, reverse), lit
+                si.p, ds, index, pmf, forward, dr.abs(dr.dot(si.n, ds.d)), h.rest(vcm, vc, reverse), lit
             )
             lit &= ~scene.ray_test(si.spawn_ray_to(ds.p), lit)
             light += dr.select(lit, beta * value * self._weight(others), 0)
@@ -269,14 +273,15 @@ class Bidirectional:
             pi = scene.ray_intersect_preliminary(ray, active=active)
         return light
 
-    def _others_of_picking(self, ds, index, pmf, forward, cos, rest, active):  # type: ignore[no-untyped-def]
-        """The other ways to make a path that ends in a picked point of a lamp, relative to that one."""
+    def _others_of_picking(self, at, ds, index, pmf, forward, cos, rest, active):  # type: ignore[no-untyped-def]
+        """The other ways to make a path from the point ``at`` to a picked point of a lamp, relative to that one."""
         flags = ds.emitter.flags()
         infinite = mi.has_flag(flags, mi.EmitterFlags.Infinite)
         squared_distance = dr.square(ds.dist)
         cos_lamp = dr.select(ds.delta | infinite, 1, dr.abs(dr.dot(ds.n, ds.d)))
         p_direct = dr.select(ds.delta, dr.select(infinite, 1, squared_distance), ds.pdf / pmf)
-        emission = self.emission.density(index, cos_lamp, p_direct, squared_distance, active)
+        place = dr.select(infinite, at, ds.p)
+        emission = self.emission.density(index, place, -ds.d, cos_lamp, p_direct, squared_distance, active)
         direct = p_direct * pmf
         hit = dr.select(ds.delta, 0, self.h(forward / direct))
         return hit + self.h(emission * cos / (direct * cos_lamp)) * rest

@@ -29,6 +29,7 @@ class BDPT(mi.CppADIntegrator):
     max_depth       edges of the longest path, 1 … 66 (6)
     light_sampler   how a lamp is picked: uniform, power, spatial, bvh (uniform)
     heuristic       how ways to make the same path are weighed: power, balance (power)
+    aim             half of the light paths go to glass and mirrors, where there are any (true)
     rr_depth        edges of a subpath before Russian roulette; 0 for none (0)
     hide_emitters   lamps and sky are not seen directly (false)
     debug_strategy  "s-t": only paths of s vertices from a lamp and t from the camera; empty for all ("")
@@ -50,6 +51,7 @@ class BDPT(mi.CppADIntegrator):
         self.options = Options(
             max_depth=depth,
             heuristic=_one_of(HEURISTICS, props, "heuristic", "power"),
+            aim=bool(props.get("aim", True)),
             hide_emitters=bool(props.get("hide_emitters", False)),
             rr_depth=roulette or None,
             strategy=(s, t) if pair else None,

@@ -4,12 +4,16 @@ Where light paths start: a point and a direction on any emitter, and the density
 Mitsuba's ``sample_ray`` gives no density, and for a rotated environment map a wrong ray. Here every kind of emitter
 goes through its ``sample_position`` or ``sample_direction``, and one formula says how densely light paths start:
 
-    p_em = P(emitter) · constant · [cos θ] · [p_ω] · [p_ω cos θ / d²]
+    p_em = P(emitter) · p_place · p_direction
 
-with the factors in brackets by kind: cos θ of area lamps (cosine-distributed over the lamp's surface), p_ω of
-environments (their own density of directions, over the disc of the scene's bounding sphere), and p_ω cos θ / d² of
-textured area lamps (their own density of positions, as seen from the lit point). Kinds that are none of these start no
-light paths; camera paths still find them.
+    area       1 / A                   cos θ / π
+    textured   p_ω cos θ / d²          cos θ / π       its own density of positions, as seen from the lit point
+    point      1                       1 / Ω           Ω the solid angle that it shines into
+    far away   1 / (π R²)              p_ω             places on the disc of the scene's bounding sphere; p_ω is its
+                                                       own density of directions, 1 where there is but one
+
+Where the scene has glass or mirrors, p_direction, or far away p_place, is half that of paths aimed at them (``aim``).
+Kinds that are none of these start no light paths; camera paths still find them.
 
 Source: Georgiev, "Implementing Vertex Connection and Merging" (2012), for what enters the weights; Veach (1997), 10.3.
 """
@@ -24,6 +28,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from renderer.integrators.aim import Targets
 from renderer.samplers.bits import floats_on_device, on_device
 
 AREA, POINT, DIRECTION, ENVIRONMENT, TEXTURED, OTHER = range(6)  # kinds of emitters
@@ -75,13 +80,15 @@ class Emission:
     """
     The emitters of ``scene`` as starts of light paths; ``lights`` picks among them (``renderer.lightsamplers``).
 
-    ``kinds`` are those that the scene has: code for others is not generated.
+    ``kinds`` are those that the scene has: code for others is not generated. ``aim`` sends half of the light paths to
+    glass and mirrors.
     """
 
-    __slots__ = ("center", "constant", "kind", "kinds", "lights", "radius")
+    __slots__ = ("center", "constant", "kind", "kinds", "lights", "radius", "targets")
 
-    def __init__(self, scene: Any, lights: Any):
+    def __init__(self, scene: Any, lights: Any, aim: bool = True):
         self.lights = lights
+        self.targets = Targets(scene.shapes() if aim else ())
         emitters = scene.emitters()
         box = scene.bbox()
         sphere = box.bounding_sphere() if box.valid() else mi.BoundingSphere3f(mi.ScalarPoint3f(0), 1)
@@ -94,22 +101,38 @@ class Emission:
         self.kind = on_device(np.array([*kinds, OTHER], np.uint32))
         self.constant = floats_on_device(np.array([*constants, 0], np.float32))
 
-    def density(self, index: Any, cos: Any, p_direct: Any, squared_distance: Any, active: Any) -> Any:
+    def density(
+        self, index: Any, place: Any, direction: Any, cos: Any, p_direct: Any, squared_distance: Any, active: Any
+    ) -> Any:
         """
-        p_em of the emitter ``index`` for light that leaves it at an angle of cosine ``cos`` (1 unless it has an area).
+        p_em of the emitter ``index`` for light that leaves it along ``direction``, at an angle of cosine ``cos`` (1
+        unless it has an area). ``place`` is where on it, or of emitters far away any point on the ray.
 
         ``p_direct`` is the density, of solid angle, of finding the point by the emitter's own ``sample_direction`` from
         the lit point at ``squared_distance``, without the probability of picking the emitter.
         """
         kind = dr.gather(mi.UInt32, self.kind, index, active)
-        value = dr.gather(mi.Float, self.constant, index, active) * self.lights.pmf_emission(index, active)
+        constant = dr.gather(mi.Float, self.constant, index, active)
+        value = self.lights.pmf_emission(index, active) * self._spread(kind, constant, place, direction, cos)
         if AREA in self.kinds:
-            value = dr.select(kind == AREA, value * cos, value)
+            value = dr.select(kind == AREA, value * constant, value)
         if ENVIRONMENT in self.kinds:
             value = dr.select(kind == ENVIRONMENT, value * p_direct, value)
         if TEXTURED in self.kinds:
-            value = dr.select(kind == TEXTURED, value * p_direct * dr.square(cos) / squared_distance, value)
-        return dr.select(active, value, 0)
+            value = dr.select(kind == TEXTURED, value * p_direct * cos / squared_distance, value)
+        return dr.select(active & (constant > 0), value, 0)
+
+    def _spread(self, kind: Any, constant: Any, place: Any, direction: Any, cos: Any) -> Any:
+        """How densely rays leave a place into ``direction``, or places of an emitter far away."""
+        own = constant
+        if self.kinds & {AREA, TEXTURED}:
+            own = dr.select((kind == AREA) | (kind == TEXTURED), cos * dr.inv_pi, own)
+        if not self.targets:
+            return own
+        near, far = self.kinds & {AREA, TEXTURED, POINT}, self.kinds & {DIRECTION, ENVIRONMENT}
+        along = self.targets.of_direction(place, direction, own) if near else own
+        across = self.targets.of_line(place, direction, own) if far else own
+        return dr.select((kind == DIRECTION) | (kind == ENVIRONMENT), across, along)
 
     def sample(self, pick: Any, where: Any, direction: Any, time: Any, wavelengths: Any) -> Start:
         """
@@ -117,39 +140,41 @@ class Emission:
 
         Infinite emitters take their direction from ``direction`` and its place on the disc from ``where``.
         """
-        index, pmf, _ = self.lights.pick_emission(pick, mi.Bool(True))
+        index, pmf, rest = self.lights.pick_emission(pick, mi.Bool(True))
+        aim = self.targets.aim(rest) if self.targets else None
         emitter = dr.gather(mi.EmitterPtr, self.lights.emitters, index)
         kind = dr.gather(mi.UInt32, self.kind, index)
         constant = dr.gather(mi.Float, self.constant, index)
         origin, toward, normal = mi.Point3f(0), mi.Vector3f(0, 0, 1), mi.Normal3f(0, 0, 1)
         uv = mi.Point2f(0)
-        light, p_em, cos = mi.Spectrum(0), mi.Float(0), mi.Float(1)
+        light, density, cos = mi.Spectrum(0), mi.Float(0), mi.Float(1)
 
         if self.kinds & {AREA, TEXTURED}:
             surface = (kind == AREA) | (kind == TEXTURED)
             ps, _ = emitter.sample_position(time, where, surface)
-            local = mi.warp.square_to_cosine_hemisphere(direction)
             at = mi.SurfaceInteraction3f(ps, wavelengths)
-            at.wi = local
-            leaving = dr.maximum(mi.Frame3f.cos_theta(local), 0)
-            away = at.to_world(local)
+            away = at.to_world(mi.warp.square_to_cosine_hemisphere(direction))
+            away = aim.direction(ps.p, direction, away) if aim else away
+            at.wi = at.to_local(away)
+            leaving = dr.maximum(mi.Frame3f.cos_theta(at.wi), 0)
             origin = dr.select(surface, at.spawn_ray(away).o, origin)
             toward = dr.select(surface, away, toward)
             normal = dr.select(surface, ps.n, normal)
             uv = dr.select(surface, ps.uv, uv)
             cos = dr.select(surface, leaving, cos)
-            p_em = dr.select(surface, pmf * ps.pdf * leaving * dr.inv_pi, p_em)
+            density = dr.select(surface, ps.pdf, density)
             light = dr.select(surface, emitter.eval(at, surface) * leaving, light)
         if POINT in self.kinds:
             point = kind == POINT
             # Which of the two samples picks the direction differs from plugin to plugin.
             ray, _ = emitter.sample_ray(time, mi.Float(0.5), direction, direction, point)
+            away = aim.direction(ray.o, direction, ray.d) if aim else ray.d
             beyond = dr.zeros(mi.Interaction3f)  # at distance 1, where the weight is the intensity
-            beyond.p, beyond.time, beyond.wavelengths = ray.o + ray.d, time, wavelengths
+            beyond.p, beyond.time, beyond.wavelengths = ray.o + away, time, wavelengths
             _, intensity = emitter.sample_direction(beyond, direction, point)
             origin = dr.select(point, ray.o, origin)
-            toward = dr.select(point, ray.d, toward)
-            p_em = dr.select(point, pmf * constant, p_em)
+            toward = dr.select(point, away, toward)
+            density = dr.select(point, 1, density)
             light = dr.select(point, intensity, light)
         if self.kinds & {DIRECTION, ENVIRONMENT}:
             far = (kind == DIRECTION) | (kind == ENVIRONMENT)
@@ -157,14 +182,16 @@ class Emission:
             inside.p, inside.time, inside.wavelengths = self.center, time, wavelengths
             ds, weight = emitter.sample_direction(inside, direction, far)
             p_direct = dr.select(kind == DIRECTION, 1, ds.pdf)
-            disc = self.radius * mi.warp.square_to_uniform_disk_concentric(where)
+            disc = mi.warp.square_to_uniform_disk_concentric(where)
             frame = mi.Frame3f(-ds.d)
-            start = self.center + frame.to_world(mi.Vector3f(disc.x, disc.y, 0)) + ds.d * self.radius
-            origin = dr.select(far, start, origin)
+            offset = frame.to_world(mi.Vector3f(self.radius * disc.x, self.radius * disc.y, 0))
+            offset = aim.offset(frame, self.center, disc, offset) if aim else offset
+            origin = dr.select(far, self.center + offset + ds.d * self.radius, origin)
             toward = dr.select(far, -ds.d, toward)
-            p_em = dr.select(far, pmf * constant * p_direct, p_em)
+            density = dr.select(far, p_direct, density)
             light = dr.select(far, weight * p_direct, light)
 
+        p_em = pmf * density * self._spread(kind, constant, origin, toward, cos)
         active = (p_em > 0) & dr.any(light != 0)
         ray = mi.Ray3f(origin, toward, time, wavelengths)
         return Start(
@@ -189,11 +216,11 @@ def _kind(emitter: Any) -> int:
 
 
 def _constant(kind: int, emitter: Any, radius: float) -> float:
-    """The constant of ``Emission.density``."""
+    """Density of positions of an area lamp, of a point lamp's directions, of the disc of one that is far away."""
     if kind == AREA:
-        return 1 / (math.pi * _number(emitter.get_shape().surface_area()))
+        return 1 / _number(emitter.get_shape().surface_area())
     if kind == TEXTURED:
-        return 1 / math.pi
+        return 1.0
     if kind == POINT:
         return _density_of_directions(emitter)
     return 0.0 if kind == OTHER else 1 / (math.pi * radius**2)

@@ -39,6 +39,7 @@ CELLS = {
     "power": ("many_lights", {"integrator": "path:light_sampler=power"}),
     "bdpt": ("cornell_box", {"integrator": "bdpt"}),
     "bdpt_spatial": ("many_lights", {"integrator": "bdpt:light_sampler=spatial,heuristic=balance"}),
+    "bdpt_aimed": ("glass_caustic", {"integrator": "bdpt"}),
     "bdpt_lens": ("defocus", {"integrator": "bdpt", "rfilter": "gaussian"}),
     "ptracer": ("cornell_box", {"integrator": "ptracer"}),
     "volpath": ("cornell_box", {"integrator": "volpath"}),

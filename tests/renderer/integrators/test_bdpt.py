@@ -37,7 +37,7 @@ SETS = {
 PLAIN = [name for name, made in SETS.items() if not set(made.values()) & set(MIRRORS)]
 COVERED = [(lamp, name) for lamp, name in product(LAMPS, SETS) if name in PLAIN or lamp not in WITH_DIRAC]
 PAIRS = [(lamp, one) for lamp, one in product(LAMPS, MATERIALS) if one not in MIRRORS or lamp not in WITH_DIRAC]
-OTHERS = 28  # comparisons in this file besides these two lists
+OTHERS = 29  # comparisons in this file besides these two lists
 COMPARISONS = len(COVERED) + len(PAIRS) + OTHERS
 
 
@@ -110,6 +110,11 @@ def test_every_way_to_pick_and_weigh(how: str, tmp_path: Path) -> None:
     """Heuristics, light samplers and Russian roulette change the noise, not the mean."""
     scene = room(lamps()["several"], named(SETS["smooth"]))
     check_means(draw(scene, how, 16, salt="a"), draw(scene, "path", 16, salt="b"), tmp_path, COMPARISONS)
+
+
+def test_what_light_paths_are_aimed_at_changes_no_mean(tmp_path: Path) -> None:
+    scene = room(lamps()["rectangle"], named(SETS["mirrors"]))
+    check_means(draw(scene, "bdpt", 16), draw(scene, "bdpt:aim=false", 16), tmp_path, COMPARISONS)
 
 
 @pytest.mark.parametrize("sampler", ["stratified", "sobol", "halton", "zsobol", "pmj02bn", "poissondisk", "ldsampler"])

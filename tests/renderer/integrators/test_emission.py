@@ -16,14 +16,17 @@ KINDS = ["rectangle", "sphere", "mesh", "textured", "point", "spot", "directiona
 COUNT = 2**18
 
 
-def starts(kind: str, power: str = "uniform") -> tuple[Any, Any]:
+AIMED = {"ball": {"type": "dielectric"}, "block": {"type": "conductor"}}  # light paths are aimed at both
+
+
+def starts(kind: str, power: str = "uniform", made_of: dict[str, Any] | None = None) -> tuple[Any, Any]:
     """(the emission, ``COUNT`` starts of light paths)."""
     import mitsuba as mi
 
     from renderer.integrators.emission import Emission
     from renderer.lightsamplers import make
 
-    loaded = room(lamps()[kind], {})
+    loaded = room(lamps()[kind], made_of or {})
     emission = Emission(loaded.scene, make(power, loaded.scene))
     rng = np.random.default_rng(3)
     pick = mi.Float(rng.random(COUNT).astype(np.float32))
@@ -33,31 +36,35 @@ def starts(kind: str, power: str = "uniform") -> tuple[Any, Any]:
     return emission, start
 
 
+@pytest.mark.parametrize("made_of", [{}, AIMED], ids=["plain", "aimed"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_density_of_a_start_is_the_one_found_from_its_first_vertex(kind: str) -> None:
+def test_the_density_of_a_start_is_the_one_found_from_its_first_vertex(kind: str, made_of: dict[str, Any]) -> None:
     """``density``, which hits and picks use, is what ``sample`` says of the same ray."""
     import drjit as dr
     import mitsuba as mi
 
-    emission, start = starts(kind)
+    emission, start = starts(kind, made_of=made_of)
     si = start.scene.ray_intersect(start.ray, start.active)
     active = start.active & si.is_valid()
     emitter = dr.gather(mi.EmitterPtr, emission.lights.emitters, start.index)
     ds = dr.zeros(mi.DirectionSample3f)
     ds.p, ds.n, ds.uv, ds.d, ds.dist, ds.emitter = start.position, start.normal, start.uv, -start.ray.d, si.t, emitter
     direct = emitter.pdf_direction(si, ds, active & ~start.delta)
-    again = emission.density(start.index, start.cos, direct, dr.square(si.t), active)
+    place = dr.select(start.infinite, si.p, start.position)
+    again = emission.density(start.index, place, start.ray.d, start.cos, direct, dr.square(si.t), active)
     error = np.abs(np.array(dr.select(active, again / start.emission, 1)) - 1)
     assert np.mean(np.array(active)) > 0.05
     assert np.quantile(error, 0.999) < 1e-4
     assert error.max() < 1e-2  # float32, at the pole of an environment map
 
 
-@pytest.mark.parametrize("power", ["uniform", "power"])
+@pytest.mark.parametrize(
+    "power, made_of", [("uniform", {}), ("power", {}), ("uniform", AIMED)], ids=["uniform", "power", "aimed"]
+)
 @pytest.mark.parametrize("kind", KINDS)
-def test_light_that_leaves_is_the_power_of_the_lamps(kind: str, power: str) -> None:
+def test_light_that_leaves_is_the_power_of_the_lamps(kind: str, power: str, made_of: dict[str, Any]) -> None:
     """The mean of beta is the power: in closed form, or for environments that of a sphere round the scene, π R² ∫ L."""
-    emission, start = starts(kind, power)
+    emission, start = starts(kind, power, made_of)
     beta = np.array(start.beta).mean(0)
     mean, error = beta.mean(), beta.std() / np.sqrt(COUNT)
     assert abs(mean - total_power(start.scene, emission)) < 4 * error + 2e-3 * mean
