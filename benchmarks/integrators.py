@@ -80,7 +80,7 @@ class Trial:
 
 TRIALS = {
     "hidden_lamp": Trial(("bdpt",), "bdpt", {("bdpt", "relMSE"): 1 / 5}, {}),
-    "glass_caustic": Trial(("bdpt",), "bdpt", {("bdpt", "relMSE"): 1 / 3}, {}),
+    "glass_caustic": Trial(("bdpt:aim=false", "bdpt"), "bdpt", {("bdpt", "relMSE"): 1 / 3}, {}),
     "many_lights": Trial(
         ("path:light_sampler=power", SPATIAL, "path:light_sampler=bvh", "bdpt", "bdpt:light_sampler=spatial"), SPATIAL,
         {(SPATIAL, "variance"): 1 / 10}, {(SPATIAL, "variance"): 1 / 15},

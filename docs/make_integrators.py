@@ -41,10 +41,11 @@ SIDE, SPP, REFERENCE_SPP = 256, 64, 512  # pixels; of path; of the reference
 ROUNDS = 3  # of the measurement
 QUALITY = 75  # of the JPEG
 ONE_LAMP = ("path", "bdpt", "ptracer", "volpath", "direct")
+GLASS = ("path", "bdpt:aim=false", "bdpt", *ONE_LAMP[2:])
 MANY_LAMPS = ("path", "path:light_sampler=spatial", "bdpt", "bdpt:light_sampler=spatial", *ONE_LAMP[2:])
 SCENES = {  # what is shown, and the integrator of the reference
     "hidden_lamp": (ONE_LAMP, "bdpt"),
-    "glass_caustic": (ONE_LAMP, "bdpt"),
+    "glass_caustic": (GLASS, "bdpt"),
     "many_lights": (MANY_LAMPS, "path:light_sampler=spatial"),
 }
 OTHERS = {  # pictures with another expectation: an error would mean nothing
@@ -134,7 +135,7 @@ def caption(scene: str, label: str, found: Mapping[str, Any]) -> str:
 
 
 def file_of(scene: str, label: str) -> str:
-    return f"{scene}-{label.replace(':light_sampler=', '-')}.jpg"
+    return f"{scene}-{re.sub(':light_sampler=|[:=]', '-', label)}.jpg"
 
 
 # ------------------------------------------------------------------------------------------ pictures
