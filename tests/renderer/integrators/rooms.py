@@ -79,6 +79,24 @@ def lamps() -> dict[str, dict[str, Any]]:
     }  # fmt: skip
 
 
+def rarer_lamps() -> dict[str, dict[str, Any]]:
+    """Lamps of other shapes and plugins, by kind; a projector starts no light paths."""
+    t = _transform()
+    area = {"type": "area", "radiance": _rgb(5, 4, 3)}
+    down = t.translate([0.2, 1.5, 0.3]) @ t.rotate([1, 0, 0], 90) @ t.scale(0.6)
+    return {
+        "disk": {"lamp": {"type": "disk", "to_world": down, "emitter": area}},
+        "cylinder": {"lamp": {"type": "cylinder", "p0": [-0.4, 1.3, 0.5], "p1": [0.6, 1.3, 0.3], "radius": 0.15,
+                              "emitter": area}},
+        "textured sphere": {"lamp": {"type": "sphere", "center": [0.3, 1.45, 0.5], "radius": 0.35,
+                                     "emitter": {"type": "area", "radiance": _bitmap(4 * _pattern(4, 8))}}},
+        "sky": {"lamp": {"type": "sunsky", "to_world": t.rotate([1, 0, 0], -90), "sun_direction": [0.3, 0.3, 0.9],
+                         "sun_scale": 0.05}},
+        "projector": {"lamp": {"type": "projector", "irradiance": _bitmap(4 * _pattern(8, 8)), "fov": 45,
+                               "to_world": t.look_at([0.1, 1.6, 1.0], [0, -0.7, 0], [0, 0, 1])}},
+    }  # fmt: skip
+
+
 DIRAC_LAMPS = ("point", "spot", "directional")  # that no path tracer's ray hits
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from renderer.errors import SceneError
-from tests.renderer.integrators.rooms import DIRAC_LAMPS, MIRRORS, draw, lamps, materials, room
+from tests.renderer.integrators.rooms import DIRAC_LAMPS, MIRRORS, draw, lamps, materials, rarer_lamps, room
 from tests.renderer.means import check_means
 from tests.renderer.scene_of import scene_of
 
@@ -37,7 +37,7 @@ SETS = {
 PLAIN = [name for name, made in SETS.items() if not set(made.values()) & set(MIRRORS)]
 COVERED = [(lamp, name) for lamp, name in product(LAMPS, SETS) if name in PLAIN or lamp not in WITH_DIRAC]
 PAIRS = [(lamp, one) for lamp, one in product(LAMPS, MATERIALS) if one not in MIRRORS or lamp not in WITH_DIRAC]
-OTHERS = 29  # comparisons in this file besides these two lists
+OTHERS = 35  # comparisons in this file besides these two lists
 COMPARISONS = len(COVERED) + len(PAIRS) + OTHERS
 
 
@@ -59,6 +59,29 @@ def test_pictures_have_the_mean_of_path(lamp: str, made_of: str, tmp_path: Path)
 def test_pictures_have_the_mean_of_path_pair_by_pair(lamp: str, material: str, tmp_path: Path) -> None:
     scene = room(lamps()[lamp], named({"ball": material, "block": material}))
     ours, theirs = (draw(scene, how, 32, 256, salt=lamp + material) for how in ("bdpt", "path"))
+    check_means(ours, theirs, tmp_path, COMPARISONS)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("lamp", ["disk", "cylinder", "textured sphere", "sky", "projector"])
+def test_rarer_lamps(lamp: str, tmp_path: Path) -> None:
+    scene = room(rarer_lamps()[lamp], named({"ball": "gloss", "block": "textured"}))
+    ours, theirs = (draw(scene, how, 32, 256, salt=lamp) for how in ("bdpt", "path"))
+    check_means(ours, theirs, tmp_path, COMPARISONS)
+
+
+@pytest.mark.slow
+def test_a_lamp_with_shading_normals(tmp_path: Path) -> None:
+    """Light leaves a lamp by the normals of its corners: the cosine and the place are those of Mitsuba's mesh."""
+    import mitsuba as mi
+
+    scene = room(lamps()["mesh"], named({"ball": "gloss"}))
+    parameters = mi.traverse(scene.scene)
+    corners = np.array(parameters["lamp.vertex_positions"]).reshape(-1, 3)
+    corners -= corners.mean(0)
+    parameters["lamp.vertex_normals"] = (corners / np.linalg.norm(corners, axis=1)[:, None]).ravel()
+    parameters.update()
+    ours, theirs = (draw(scene, how, 32, 256) for how in ("bdpt", "path"))
     check_means(ours, theirs, tmp_path, COMPARISONS)
 
 
