@@ -78,8 +78,9 @@ class Targets:
     __slots__ = ("all",)
 
     def __init__(self, shapes: Iterable[Any]):
-        spheres = _grouped([_sphere(shape) for shape in shapes if _is_mirror(shape.bsdf())])
-        self.all = [Target(mi.Point3f(*map(float, at[:3])), mi.Float(float(at[3]))) for at in spheres]
+        spheres = [_sphere(shape) for shape in shapes if _is_mirror(shape.bsdf())]
+        solid = [at for at in spheres if np.isfinite(at).all() and at[3] > 0]  # nothing can be aimed at a point
+        self.all = [Target(mi.Point3f(*map(float, at[:3])), mi.Float(float(at[3]))) for at in _grouped(solid)]
         for target in self.all:
             dr.make_opaque(target.center, target.radius)
 

@@ -130,6 +130,15 @@ def test_light_is_aimed_at_what_has_dirac_lobes_alone(bsdf: dict[str, Any], aime
     assert bool(Targets(scene_of({"ball": {"type": "sphere", "bsdf": bsdf}}).shapes())) == aimed
 
 
+def test_nothing_is_aimed_at_what_has_no_size() -> None:
+    import mitsuba as mi
+
+    from renderer.integrators.aim import Targets
+
+    point = {"type": "cube", "to_world": mi.ScalarTransform4f().scale(0), "bsdf": {"type": "conductor"}}
+    assert not Targets([mi.load_dict(point)])
+
+
 def test_a_sphere_round_a_mesh_holds_its_corners() -> None:
     from renderer.integrators.aim import ROOM, Targets
 
