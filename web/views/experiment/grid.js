@@ -34,7 +34,7 @@ import { usePort, windowOf } from "./window.js";
 
 const GAP = 12; // px between tiles
 const CAPTION = 44; // px: two lines under a picture
-const LABEL = 148; // px: the row's label, where there is room for a column of them
+const LABEL = 136; // px: the row's label, where there is room for a column of them
 const LINE = 26; // px: the row's label above the row, where there is not
 const HEAD = 34; // px: the line of column labels
 const NARROW = 480; // px: a phone
@@ -170,9 +170,9 @@ function Label({ axis, value, view, dark, replays }) {
   return html`<span><i class="dot" style=${{ background: colour }}></i>${replays.includes(value) && html`<${Replay} /> `}${breakable(value)}</span>`;
 }
 
-/** A label that may break where its parts meet. @param {string} value */
+/** A label that may break where its parts meet, as may the one name that is too long. @param {string} value */
 function breakable(value) {
-  return value.split(/(?<=[:,=])/).flatMap((part) => [part, html`<wbr />`]);
+  return value.split(/(?<=[:,=]|^relaxed)/).flatMap((part) => [part, html`<wbr />`]);
 }
 
 /** @typedef {{width: number, narrow: boolean, beside: boolean, above: boolean}} Room width in px; where references stand */
