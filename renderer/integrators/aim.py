@@ -39,8 +39,8 @@ class Target:
 
     def cone(self, x: Any) -> Any:
         """1 − cos of half the angle it fills as seen from ``x``; negative from within."""
-        sine = dr.square(self.radius) / dr.squared_norm(self.center - x)  # squared
-        return dr.select(sine < 1, sine / (1 + dr.safe_sqrt(1 - sine)), -1)
+        sin2 = dr.square(self.radius) / dr.squared_norm(self.center - x)
+        return dr.select(sin2 < 1, sin2 / (1 + dr.safe_sqrt(1 - sin2)), -1)
 
     def misses(self, x: Any, direction: Any) -> Any:
         """Whether the whole line through ``x`` does."""
@@ -58,11 +58,11 @@ class Aim:
     def direction(self, x: Any, sample: Any, own: Any) -> Any:
         """From ``x`` to it, evenly over its cone; ``own`` where nothing is aimed at."""
         size = self.target.cone(x)
-        down = sample.x * size  # 1 − cos, exact for small cones
-        sine = dr.safe_sqrt(down * (2 - down))
+        down = sample.x * size  # 1 − cos of the angle to its axis, exact for small cones
+        across = dr.safe_sqrt(down * (2 - down))
         sin, cos = dr.sincos(dr.two_pi * sample.y)
         frame = mi.Frame3f(dr.normalize(self.target.center - x))
-        aimed = frame.to_world(mi.Vector3f(sine * cos, sine * sin, 1 - down))
+        aimed = frame.to_world(mi.Vector3f(across * cos, across * sin, 1 - down))
         return dr.select(self.active & (size > 0), aimed, own)
 
     def offset(self, frame: Any, origin: Any, on_disc: Any, own: Any) -> Any:
@@ -97,7 +97,7 @@ class Targets:
         return Aim(u < SHARE, Target(center, radius))
 
     def of_direction(self, x: Any, direction: Any, own: Any) -> Any:
-        """Density of solid angle of the mixture, for a lamp that has the density ``own`` by itself."""
+        """Density of solid angle of the mixture, for a lamp that has ``own`` by itself. There must be a target."""
         aimed = mi.Float(0)
         for target in self.all:
             size = target.cone(x)
@@ -114,7 +114,7 @@ class Targets:
         return self._mixed(own, aimed)
 
     def _mixed(self, own: Any, aimed: Any) -> Any:
-        return (1 - SHARE) * own + SHARE / len(self.all) * aimed if self.all else own
+        return (1 - SHARE) * own + SHARE / len(self.all) * aimed
 
 
 def _is_mirror(bsdf: Any) -> bool:

@@ -12,7 +12,8 @@ goes through its ``sample_position`` or ``sample_direction``, and one formula sa
     far away   1 / (π R²)              p_ω             places on the disc of the scene's bounding sphere; p_ω is its
                                                        own density of directions, 1 where there is but one
 
-Where the scene has glass or mirrors, p_direction, or far away p_place, is half that of paths aimed at them (``aim``).
+Where the scene has glass or mirrors, p_direction, or far away p_place, is the mean of that and of the density of paths
+that are aimed at them (``aim``).
 Kinds that are none of these start no light paths; camera paths still find them.
 
 Source: Georgiev, "Implementing Vertex Connection and Merging" (2012), for what enters the weights; Veach (1997), 10.3.

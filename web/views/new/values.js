@@ -192,7 +192,7 @@ export function ReferenceFields({ reference, own, catalog, onChange }) {
     </div>`}
     ${wanted &&
     !(integrator && sampler && spp) &&
-    html`<ul class="hint plain">
+    html`<ul class="hint">
       ${own.map(({ name, reference }) => html`<li key=${name}><b>${name}</b> has ${reference}</li>`)}
     </ul>`}`;
 }
